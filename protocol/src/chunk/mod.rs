@@ -1,0 +1,81 @@
+//! A chunk: about one second of the match that can be decoded alone, stored as an ordinary GLB 2.0 file.
+
+use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::{camera::Camera, manifest::PersonId, mesh::Mesh, time::Ticks};
+
+/// One decoded chunk.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Chunk {
+    /// Frames in order of time; they follow each other without overlap.
+    pub frames: Vec<ChunkFrame>,
+}
+
+/// One frame of the clip as it stands on the table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChunkFrame {
+    /// Index of the frame in the clip it came from.
+    pub clip_frame: u32,
+    /// When it is shown, from the start of the stream.
+    pub start: Ticks,
+    /// How long it is shown.
+    pub duration: Ticks,
+    /// The broadcast camera of this frame, when it was found.
+    pub camera: Option<Camera>,
+    /// How far the reconstruction of this frame can be trusted.
+    pub quality: FrameQuality,
+    /// The ball, when it is known.
+    pub ball: Option<Ball>,
+    /// The texture of all bodies of this frame, still encoded.
+    pub atlas: Option<EncodedImage>,
+    /// The people that have a mesh in this frame.
+    pub bodies: Vec<Body>,
+}
+
+/// Figures of one frame that the player shows under the timeline.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrameQuality {
+    /// Median distance between the drawn pitch lines and the lines seen, pixels of the clip.
+    pub line_residual_px: Option<f32>,
+    /// Mean confidence of the tracks seen in this frame, 0..1.
+    pub track_confidence: Option<f32>,
+}
+
+/// The ball.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ball {
+    /// Its middle, world metres.
+    pub position_m: DVec3,
+    /// Whether its height was measured; when not, it is taken to lie on the grass.
+    pub height_known: bool,
+}
+
+/// An encoded picture in a format that glTF allows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncodedImage {
+    /// How it is encoded.
+    pub format: ImageFormat,
+    /// The file's bytes.
+    pub bytes: Vec<u8>,
+}
+
+/// Picture formats a chunk may hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageFormat {
+    /// JPEG.
+    Jpeg,
+    /// PNG.
+    Png,
+}
+
+/// One person in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Who it is.
+    pub person: PersonId,
+    /// Where the person stands: the point of the pitch under the body, world metres.
+    pub anchor_m: Vec3,
+    /// The surface; positions in metres relative to `anchor_m` in world axes, texture coordinates into the frame's atlas.
+    pub mesh: Mesh,
+}

@@ -1,0 +1,15 @@
+//! The Holopitch stream: what is in it, how it is written and read, and how it is played back.
+//!
+//! No I/O, no clock, no GPU: bytes and moments come in from the caller. Compiles for `wasm32-unknown-unknown`.
+
+// Tests may panic: that is how they fail.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod camera;
+pub mod chunk;
+pub mod limits;
+pub mod manifest;
+pub mod mesh;
+pub mod pitch;
+pub mod playback;
+pub mod time;

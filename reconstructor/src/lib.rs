@@ -1,0 +1,23 @@
+//! Clip to stream: the pipeline of "Soccer on Your Tabletop" (Rematas et al., CVPR 2018), one module per section.
+//!
+//! `ingest → detection → calibration → pose → tracking → segmentation → depth → mesh → trajectory → encode`.
+//! A stage is one entry function with typed input and output; no stage imports a later one.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+pub mod calibration;
+pub mod depth;
+pub mod detection;
+pub mod encode;
+pub mod evaluate;
+pub mod geometry;
+pub mod inference;
+pub mod ingest;
+pub mod mesh;
+pub mod pipeline;
+pub mod pose;
+pub mod report;
+pub mod segmentation;
+pub mod serve;
+pub mod tracking;
+pub mod trajectory;

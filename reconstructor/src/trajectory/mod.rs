@@ -1,0 +1,1 @@
+//! Section 4.5: smooth paths on the pitch.
