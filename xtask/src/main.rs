@@ -1,2 +1,69 @@
-//! placeholder
-fn main() {}
+//! `cargo xtask`: everything around the code, with nothing to install by hand.
+//!
+//! `demo` and `test` are the README's two commands; both begin with `setup`.
+
+mod bench;
+mod dataset;
+mod demo;
+mod process;
+mod setup;
+mod test;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Parser, Subcommand};
+
+/// Set-up, demo, tests and benchmarks of Holopitch.
+#[derive(Parser)]
+#[command(name = "cargo xtask", after_help = "Example: cargo xtask demo")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Install what is missing: system packages by apt, ONNX Runtime pinned by its hash, the glTF validator
+    Setup,
+    /// Reconstruct the shipped clip into target/demo/stream, draw pictures of it, open the player
+    Demo {
+        /// Draw the pictures but do not open a window
+        #[arg(long)]
+        no_window: bool,
+    },
+    /// Run everything CI runs
+    Test,
+    /// Measure decode, upload and draw of the demo stream, and the codecs
+    Bench,
+    /// Make a data set under target/datasets
+    Dataset {
+        /// Which: depth-train or depth-test
+        name: dataset::Name,
+        /// Samples to render; the default is the number the shipped figures were measured on
+        #[arg(long)]
+        count: Option<usize>,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Setup => setup::everything(),
+        Command::Demo { no_window } => demo::run(no_window),
+        Command::Test => test::run(),
+        Command::Bench => bench::run(),
+        Command::Dataset { name, count } => dataset::run(name, count),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The folder of the workspace.
+fn root() -> PathBuf {
+    let xtask = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    xtask.parent().map_or(xtask.clone(), PathBuf::from)
+}

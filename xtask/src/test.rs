@@ -1,0 +1,55 @@
+//! Everything CI runs, in the order that fails fastest.
+
+use anyhow::Result;
+
+use crate::{
+    process::{cargo, output, run_command},
+    root, setup,
+};
+
+/// Formatting, lints, licences, the web build of the libraries that promise one, and every test.
+pub(crate) fn run() -> Result<()> {
+    println!("test: set up, formatting, lints, licences, wasm check, all tests");
+    cargo(&["fmt", "--all", "--check"])?;
+    setup::everything()?;
+    cargo(&["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
+    licences()?;
+    web()?;
+    tests()
+}
+
+/// `cargo test` on software Vulkan, with every optional tool required: here nothing may skip for want of one.
+fn tests() -> Result<()> {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    run_command(
+        std::process::Command::new(cargo)
+            .args(["test", "--workspace"])
+            .envs(setup::environment())
+            .env("VK_DRIVER_FILES", setup::software_vulkan()?)
+            .env("HOLOPITCH_REQUIRE_TOOLS", "1")
+            .current_dir(root()),
+    )
+}
+
+/// Every dependency's licence against `deny.toml`.
+fn licences() -> Result<()> {
+    let cargo_deny = setup::cargo_deny()?;
+    run_command(
+        std::process::Command::new(cargo_deny)
+            .args(["--offline", "check", "licenses", "bans", "sources"])
+            .current_dir(root()),
+    )
+}
+
+/// The libraries that must compile for a browser. The standard library for that target is not to be had on every
+/// machine: then this says so and goes on.
+fn web() -> Result<()> {
+    const TARGET: &str = "wasm32-unknown-unknown";
+    let installed =
+        || output("rustup", &["target", "list", "--installed"]).is_some_and(|l| l.contains(TARGET));
+    if !installed() && output("rustup", &["target", "add", TARGET]).is_none() {
+        println!("SKIPPED wasm check: rustup could not add the target {TARGET}");
+        return Ok(());
+    }
+    cargo(&["check", "--target", TARGET, "--package", "protocol", "--package", "player", "--lib"])
+}
