@@ -7,9 +7,14 @@
 
 pub mod camera;
 pub mod chunk;
+pub mod glb;
+pub mod gltf;
+pub mod hash;
 pub mod limits;
 pub mod manifest;
 pub mod mesh;
 pub mod pitch;
 pub mod playback;
+#[cfg(any(test, feature = "sample"))]
+pub mod sample;
 pub mod time;

@@ -1,17 +1,80 @@
 //! `match.json`: what a stream holds and where.
+//!
+//! Reading checks everything that a reader relies on later: counts, paths that stay inside the stream, order of time.
+
+mod check;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    limits::Limits,
     pitch::Pitch,
     time::{Ticks, Timescale},
 };
 
+/// The value of [`Manifest::format`].
+pub const FORMAT: &str = "holopitch";
+/// The format version that this crate writes; it reads every version with the same major number.
+pub const VERSION: &str = "1.0";
+/// Name of the manifest's file.
+pub const FILE_NAME: &str = "match.json";
+/// Major version this crate reads.
+const MAJOR: u32 = 1;
+
+/// Why a manifest cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ManifestError {
+    /// Not JSON, or a field is missing or of the wrong type.
+    #[error("match.json is not a Holopitch manifest: {message}")]
+    Json {
+        /// What the parser said, with line and column.
+        message: String,
+    },
+    /// Some other format.
+    #[error("match.json says format \"{found}\", expected \"holopitch\"")]
+    Format {
+        /// What it says.
+        found: String,
+    },
+    /// Written for newer (or broken) readers.
+    #[error(
+        "match.json has format version {found}, this program reads version {MAJOR}.x: use a newer program"
+    )]
+    Version {
+        /// What it says.
+        found: String,
+    },
+    /// Larger than the reader is willing to spend.
+    #[error("match.json has {found} {what}, the limit is {limit}: raise the limit if you trust the stream")]
+    Limit {
+        /// What there is too much of.
+        what: &'static str,
+        /// How much there is.
+        found: u64,
+        /// How much is allowed.
+        limit: u64,
+    },
+    /// A path that could leave the stream's folder, or means different things to files and to URLs.
+    #[error("match.json names the path {path:?}, which {problem}")]
+    Path {
+        /// The path.
+        path: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// A value that makes no sense.
+    #[error("match.json: {field} {problem}")]
+    Value {
+        /// Where.
+        field: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+}
+
 /// Identity of a person within one stream.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct PersonId(pub u32);
 
@@ -36,10 +99,88 @@ pub struct Manifest {
     pub representations: Vec<Representation>,
 }
 
+impl Manifest {
+    /// Reads and checks a manifest.
+    ///
+    /// # Errors
+    /// When it is too large, not JSON, of another format or major version, or says something impossible.
+    pub fn from_json(bytes: &[u8], limits: &Limits) -> Result<Self, ManifestError> {
+        if bytes.len() > limits.manifest_bytes {
+            let (found, limit) = (bytes.len() as u64, limits.manifest_bytes as u64);
+            return Err(ManifestError::Limit { what: "bytes", found, limit });
+        }
+        let json = |error: serde_json::Error| ManifestError::Json { message: error.to_string() };
+        // A newer major version may differ in anything but these two fields.
+        let head: Head = serde_json::from_slice(bytes).map_err(json)?;
+        head.check()?;
+        let manifest: Self = serde_json::from_slice(bytes).map_err(json)?;
+        manifest.validate(limits)?;
+        Ok(manifest)
+    }
+
+    /// The manifest as readable JSON.
+    ///
+    /// # Errors
+    /// When a number has no form in JSON.
+    pub fn to_json(&self) -> Result<String, ManifestError> {
+        let json = serde_json::to_string_pretty(self);
+        json.map(|text| text + "\n").map_err(|error| ManifestError::Json { message: error.to_string() })
+    }
+
+    /// Checks what types cannot say; see [`ManifestError`].
+    ///
+    /// # Errors
+    /// The first thing found wrong.
+    pub fn validate(&self, limits: &Limits) -> Result<(), ManifestError> {
+        Head { format: self.format.clone(), version: self.version.clone() }.check()?;
+        check::manifest(self, limits)
+    }
+
+    /// The best representation.
+    #[must_use]
+    pub fn best(&self) -> Option<&Representation> {
+        self.representations.last()
+    }
+}
+
+impl Representation {
+    /// Index of the chunk shown at `moment`: the last one that has started, or the first.
+    #[must_use]
+    pub fn chunk_at(&self, moment: Ticks) -> Option<usize> {
+        if self.chunks.is_empty() {
+            return None;
+        }
+        Some(self.chunks.partition_point(|chunk| chunk.start <= moment).saturating_sub(1))
+    }
+}
+
+/// The two fields that every version has.
+#[derive(Deserialize)]
+struct Head {
+    format: String,
+    version: String,
+}
+
+impl Head {
+    fn check(&self) -> Result<(), ManifestError> {
+        if self.format != FORMAT {
+            return Err(ManifestError::Format { found: self.format.clone() });
+        }
+        let major = self.version.split_once('.').and_then(|(major, minor)| {
+            minor.parse::<u32>().ok()?;
+            major.parse::<u32>().ok()
+        });
+        if major != Some(MAJOR) {
+            return Err(ManifestError::Version { found: self.version.clone() });
+        }
+        Ok(())
+    }
+}
+
 /// A file of the stream.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FileEntry {
-    /// Path relative to the manifest.
+    /// Path relative to the manifest: letters, digits, `.`, `_`, `-`, with `/` between folders; never `..`.
     pub path: String,
     /// Length of the file.
     pub bytes: u64,

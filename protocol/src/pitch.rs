@@ -152,7 +152,8 @@ impl Pitch {
     /// Whether a pitch position (world x, z) lies inside the lines widened by `margin_m`.
     #[must_use]
     pub fn contains(&self, position: DVec2, margin_m: f64) -> bool {
-        position.x.abs() <= self.length_m / 2.0 + margin_m && position.y.abs() <= self.width_m / 2.0 + margin_m
+        position.x.abs() <= self.length_m / 2.0 + margin_m
+            && position.y.abs() <= self.width_m / 2.0 + margin_m
     }
 }
 

@@ -1,4 +1,22 @@
 //! A chunk: about one second of the match that can be decoded alone, stored as an ordinary GLB 2.0 file.
+//!
+//! [`encode`] and [`decode`] are the only ways in and out; the layout of the file is in this crate's README.
+
+mod decode;
+mod draco;
+mod encode;
+mod error;
+mod index;
+mod picture;
+
+#[cfg(test)]
+mod tests;
+
+pub use self::{
+    decode::{ByteSplit, byte_split, decode},
+    encode::{Quantisation, encode, encode_with},
+    error::ChunkError,
+};
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -10,6 +28,24 @@ use crate::{camera::Camera, manifest::PersonId, mesh::Mesh, time::Ticks};
 pub struct Chunk {
     /// Frames in order of time; they follow each other without overlap.
     pub frames: Vec<ChunkFrame>,
+}
+
+impl Chunk {
+    /// When the first frame is shown and when the last one ends; `None` without frames.
+    #[must_use]
+    pub fn span(&self) -> Option<(Ticks, Ticks)> {
+        let (first, last) = (self.frames.first()?, self.frames.last()?);
+        Some((first.start, last.start + last.duration))
+    }
+
+    /// Index of the frame shown at `moment`: the last one that has started, or the first.
+    #[must_use]
+    pub fn frame_at(&self, moment: Ticks) -> Option<usize> {
+        if self.frames.is_empty() {
+            return None;
+        }
+        Some(self.frames.partition_point(|frame| frame.start <= moment).saturating_sub(1))
+    }
 }
 
 /// One frame of the clip as it stands on the table.
@@ -60,6 +96,14 @@ pub struct EncodedImage {
     pub bytes: Vec<u8>,
 }
 
+impl EncodedImage {
+    /// Width and height in pixels as the file's header says, or `None` when it is not a file of its format.
+    #[must_use]
+    pub fn size_px(&self) -> Option<(u32, u32)> {
+        picture::size_px(self.format, &self.bytes)
+    }
+}
+
 /// Picture formats a chunk may hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageFormat {
@@ -67,6 +111,17 @@ pub enum ImageFormat {
     Jpeg,
     /// PNG.
     Png,
+}
+
+impl ImageFormat {
+    /// The media type that glTF names it by.
+    #[must_use]
+    pub fn mime_type(self) -> &'static str {
+        match self {
+            Self::Jpeg => "image/jpeg",
+            Self::Png => "image/png",
+        }
+    }
 }
 
 /// One person in one frame.
