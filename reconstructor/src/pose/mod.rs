@@ -1,12 +1,80 @@
 //! Section 4.2, second half: the pose and the instance mask of everybody who can stand on the pitch.
+//!
+//! Boxes that cannot hold a person on the pitch go first; the pose network then looks at each of the others, and its
+//! verdict, the feet and the height on the pitch decide who stays. Skeletons that coincide are one person.
+
+mod blazepose;
+mod ground;
+mod silhouette;
 
 use glam::{DVec2, DVec3};
+use image::RgbImage;
+use protocol::{camera::Camera, pitch::Pitch};
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Mask, PixelBox};
+pub(crate) use silhouette::{bones, cut};
+
+use crate::{
+    detection::Detection,
+    geometry::{Mask, PixelBox},
+    inference::{InferenceError, Model},
+};
+
+/// File name of the pose network in `assets/models`.
+pub const MODEL: &str = "blazepose_full.onnx";
 
 /// Joints of the pose network, in its order: BlazePose's 33 landmarks.
 pub const JOINTS: usize = 33;
+
+/// Places of joints among the [`JOINTS`]; left is the person's own left.
+pub mod index {
+    /// Tip of the nose.
+    pub const NOSE: usize = 0;
+    /// Left shoulder.
+    pub const LEFT_SHOULDER: usize = 11;
+    /// Right shoulder.
+    pub const RIGHT_SHOULDER: usize = 12;
+    /// Left elbow.
+    pub const LEFT_ELBOW: usize = 13;
+    /// Right elbow.
+    pub const RIGHT_ELBOW: usize = 14;
+    /// Left wrist.
+    pub const LEFT_WRIST: usize = 15;
+    /// Right wrist.
+    pub const RIGHT_WRIST: usize = 16;
+    /// Left hip.
+    pub const LEFT_HIP: usize = 23;
+    /// Right hip.
+    pub const RIGHT_HIP: usize = 24;
+    /// Left knee.
+    pub const LEFT_KNEE: usize = 25;
+    /// Right knee.
+    pub const RIGHT_KNEE: usize = 26;
+    /// Left ankle.
+    pub const LEFT_ANKLE: usize = 27;
+    /// Right ankle.
+    pub const RIGHT_ANKLE: usize = 28;
+    /// Left heel.
+    pub const LEFT_HEEL: usize = 29;
+    /// Right heel.
+    pub const RIGHT_HEEL: usize = 30;
+    /// Tip of the left foot.
+    pub const LEFT_TOE: usize = 31;
+    /// Tip of the right foot.
+    pub const RIGHT_TOE: usize = 32;
+}
+
+/// Boxes that the pose network looks at in one picture, best first: more than stand on a pitch with substitutes
+/// warming up, and a bound on the time that one picture of noise can take.
+const CANDIDATES_MAX: usize = 80;
+/// Below this the network saw no whole person.
+const POSE_SCORE_MIN: f32 = 0.3;
+/// A mask below this share of the body's box is none.
+const MASK_SHARE_MIN: f64 = 0.08;
+/// A box whose middle part is inside a person's own mask up to this share was that person again.
+const SAME_MASK: f64 = 0.5;
+/// Skeletons nearer than this, on average over the trunk and legs, are the same person, metres.
+const SAME_SKELETON_M: f64 = 0.25;
 
 /// One joint.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,4 +106,174 @@ pub struct Person {
     pub ground_m: DVec3,
     /// Neck lifted on the upright plane through `ground_m`, world metres.
     pub neck_m: DVec3,
+}
+
+/// Why poses could not be estimated.
+#[derive(Debug, thiserror::Error)]
+pub enum PoseError {
+    /// The network could not be loaded or run.
+    #[error("pose network: {0}")]
+    Inference(#[from] InferenceError),
+}
+
+/// The pose network; one per thread.
+#[derive(Debug)]
+pub struct PoseEstimator {
+    model: Model,
+}
+
+impl PoseEstimator {
+    /// Loads the network.
+    ///
+    /// # Errors
+    /// When ONNX Runtime or the model is missing or unusable.
+    pub fn load() -> Result<Self, PoseError> {
+        Ok(Self { model: Model::load_shipped(MODEL)? })
+    }
+
+    /// Everybody of `detections` who can stand on the pitch, from left to right of the picture.
+    ///
+    /// # Errors
+    /// When the network fails.
+    pub fn people(
+        &mut self,
+        picture: &RgbImage,
+        detections: &[Detection],
+        camera: &Camera,
+        pitch: &Pitch,
+    ) -> Result<Vec<Person>, PoseError> {
+        let mut candidates: Vec<&Detection> =
+            detections.iter().filter(|d| ground::box_may_stand(camera, pitch, &d.bounds)).collect();
+        candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut people: Vec<Person> = Vec::new();
+        for detection in candidates.into_iter().take(CANDIDATES_MAX) {
+            let Some(person) = self.person(picture, detection, camera, pitch)? else { continue };
+            match people.iter_mut().find(|other| same_person(other, &person, camera)) {
+                Some(other) if other.pose_score * other.score < person.pose_score * person.score => {
+                    *other = person
+                }
+                Some(_) => {}
+                None => people.push(person),
+            }
+        }
+        people.sort_by(|a, b| a.neck_px.x.total_cmp(&b.neck_px.x));
+        Ok(people)
+    }
+
+    fn person(
+        &mut self,
+        picture: &RgbImage,
+        detection: &Detection,
+        camera: &Camera,
+        pitch: &Pitch,
+    ) -> Result<Option<Person>, PoseError> {
+        let square = blazepose::Square::round(&detection.bounds);
+        if picture.is_empty() || !(square.side >= 1.0) || !square.centre.is_finite() {
+            return Ok(None);
+        }
+        let seen = blazepose::estimate(&mut self.model, picture, square)?;
+        Ok(person_from(seen, detection, camera, pitch))
+    }
+}
+
+/// A person from what the network saw, if it can be one.
+fn person_from(
+    seen: blazepose::Estimate,
+    detection: &Detection,
+    camera: &Camera,
+    pitch: &Pitch,
+) -> Option<Person> {
+    if seen.score < POSE_SCORE_MIN {
+        return None;
+    }
+    let ground_m = ground::stand(camera, pitch, &seen.joints)?;
+    let neck_px = ground::middle(&seen.joints, index::LEFT_SHOULDER, index::RIGHT_SHOULDER)?;
+    let neck_m = ground::lift(camera, neck_px, ground_m)?;
+    let mask = silhouette::clean(&seen.mask, &seen.joints);
+    let bounds = silhouette::bounds(&mask, &seen.joints)?;
+    let size = bounds.size();
+    if (mask.area_px() as f64) < MASK_SHARE_MIN * size.x * size.y {
+        return None;
+    }
+    Some(Person {
+        bounds,
+        score: detection.score,
+        pose_score: seen.score,
+        joints: seen.joints,
+        mask,
+        neck_px,
+        ground_m,
+        neck_m,
+    })
+}
+
+/// Whether two skeletons, or two masks, are those of one person.
+fn same_person(a: &Person, b: &Person, camera: &Camera) -> bool {
+    let compared = [
+        index::LEFT_SHOULDER,
+        index::RIGHT_SHOULDER,
+        index::LEFT_HIP,
+        index::RIGHT_HIP,
+        index::LEFT_KNEE,
+        index::RIGHT_KNEE,
+    ];
+    let middle =
+        |p: &Person| compared.iter().filter_map(|&j| p.joints.get(j)).map(|j| j.pixel).sum::<DVec2>();
+    let count = compared.len() as f64;
+    let mut apart_px = 0.0;
+    for joint in compared {
+        let (Some(p), Some(q)) = (a.joints.get(joint), b.joints.get(joint)) else { return false };
+        apart_px += p.pixel.distance(q.pixel) / count;
+    }
+    // The network sometimes swaps left and right between two looks at one person: then only the middles coincide.
+    let middles_px = (middle(a) - middle(b)).length() / count;
+    let near_px = SAME_SKELETON_M * camera.pixels_per_metre(a.ground_m);
+    apart_px < near_px || middles_px < 0.5 * near_px || mask_iou(&a.mask, &b.mask) > SAME_MASK
+}
+
+/// Intersection over union of the pixels inside two masks, 0..1.
+fn mask_iou(a: &Mask, b: &Mask) -> f64 {
+    let (area_a, area_b) = (a.area_px(), b.area_px());
+    let width = a.width.max(1) as usize;
+    let shared = a
+        .coverage
+        .iter()
+        .enumerate()
+        .filter(|(i, c)| {
+            let (x, y) = (a.x0 + (i % width) as i32, a.y0 + (i / width) as i32);
+            **c >= silhouette::INSIDE && b.at(x, y) >= silhouette::INSIDE
+        })
+        .count();
+    let union = area_a + area_b - shared;
+    if union == 0 { 0.0 } else { shared as f64 / union as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn person(x: f64, lean_px: f64) -> Person {
+        let joints: Vec<Joint> = (0..JOINTS)
+            .map(|i| Joint { pixel: DVec2::new(x + lean_px, i as f64 * 2.0), depth_m: 0.0, visibility: 1.0 })
+            .collect();
+        let mask = Mask { x0: x as i32 - 8, y0: 0, width: 16, height: 60, coverage: vec![255; 16 * 60] };
+        let zero = DVec3::ZERO;
+        let bounds = PixelBox { min: DVec2::new(x - 8.0, 0.0), max: DVec2::new(x + 8.0, 60.0) };
+        let neck_px = DVec2::new(x, 22.0);
+        Person { bounds, score: 0.5, pose_score: 0.9, joints, mask, neck_px, ground_m: zero, neck_m: zero }
+    }
+
+    #[test]
+    fn the_same_person_twice_is_one_and_neighbours_are_two() {
+        let camera = Camera::looking_at((1280, 720), 2000.0, DVec3::new(0.0, 15.0, 60.0), DVec3::ZERO);
+        assert!(same_person(&person(100.0, 0.0), &person(102.0, 1.0), &camera));
+        assert!(!same_person(&person(100.0, 0.0), &person(115.0, 0.0), &camera));
+    }
+
+    #[test]
+    fn masks_overlap_by_their_pixels() {
+        assert!((mask_iou(&person(100.0, 0.0).mask, &person(100.0, 0.0).mask) - 1.0).abs() < 1e-12);
+        assert!((mask_iou(&person(100.0, 0.0).mask, &person(108.0, 0.0).mask) - 1.0 / 3.0).abs() < 1e-12);
+        assert!(mask_iou(&Mask::default(), &person(108.0, 0.0).mask).abs() < 1e-12);
+    }
 }
