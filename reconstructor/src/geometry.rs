@@ -62,7 +62,8 @@ impl Mask {
     #[must_use]
     pub fn at(&self, x: i32, y: i32) -> u8 {
         let (column, row) = (i64::from(x) - i64::from(self.x0), i64::from(y) - i64::from(self.y0));
-        let inside = column >= 0 && row >= 0 && column < i64::from(self.width) && row < i64::from(self.height);
+        let inside =
+            column >= 0 && row >= 0 && column < i64::from(self.width) && row < i64::from(self.height);
         if !inside {
             return 0;
         }

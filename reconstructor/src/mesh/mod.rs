@@ -1,8 +1,22 @@
 //! Section 4.4: a textured mesh per player from its depth map.
+//!
+//! Every pixel of the player becomes a point of the world, neighbouring pixels become faces, the picture becomes the
+//! texture. Only the side that the camera saw is there: the back of the body is open.
 
-use glam::DVec3;
+mod contact;
+mod decimate;
+mod grid;
+mod texture;
+
+use glam::{DVec2, DVec3};
 use image::RgbImage;
-use protocol::{manifest::PersonId, mesh::Mesh};
+use protocol::{camera::Camera, manifest::PersonId, mesh::Mesh};
+use thiserror::Error;
+
+use crate::{depth::DepthMap, pose::Person};
+
+pub use contact::MAX_CORRECTION_M;
+pub use grid::{DEPTH_JUMP_M, DEPTH_JUMP_PIXELS};
 
 /// The surface of one player in one frame.
 #[derive(Clone, Debug)]
@@ -20,3 +34,122 @@ pub struct BodySurface {
     /// 0..1.
     pub confidence: f32,
 }
+
+/// How much a mesh may cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshBudget {
+    /// Triangles at most.
+    pub triangles: usize,
+}
+
+impl Default for MeshBudget {
+    fn default() -> Self {
+        Self { triangles: 1_000 }
+    }
+}
+
+/// Why a player has no mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum MeshError {
+    /// The depth map's arrays do not fit its rectangle.
+    #[error(
+        "the depth map of {width}×{height} pixels has {coverage} coverages and {offsets} depths; estimate it again"
+    )]
+    Sizes {
+        /// Columns of the mask.
+        width: u32,
+        /// Rows of the mask.
+        height: u32,
+        /// Coverages given.
+        coverage: usize,
+        /// Depth offsets given.
+        offsets: usize,
+    },
+    /// The upright plane through the player cannot be built or not be seen.
+    #[error("the camera stands above the player or behind it, so the player's upright plane is not seen")]
+    NoPlane,
+    /// Nothing left after cutting and cleaning.
+    #[error(
+        "only {triangles} triangles of the player are connected; it is too small or its mask is in pieces"
+    )]
+    TooSmall {
+        /// Triangles in the largest piece.
+        triangles: usize,
+    },
+}
+
+/// The upright plane through a player's anchor that faces the camera: what depth maps are measured from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VirtualPlane {
+    camera: Camera,
+    forward: DVec3,
+    anchor_m: DVec3,
+    normal: DVec3,
+}
+
+impl VirtualPlane {
+    /// The plane through `anchor_m`; `None` when the camera is straight above or the anchor is behind it.
+    pub(crate) fn new(camera: &Camera, anchor_m: DVec3) -> Option<Self> {
+        let towards = (camera.position - anchor_m).with_y(0.0);
+        let normal = towards.try_normalize()?;
+        (camera.depth(anchor_m) > 0.1).then(|| Self {
+            camera: *camera,
+            forward: camera.forward(),
+            anchor_m,
+            normal,
+        })
+    }
+
+    /// The world point seen at `pixel` whose camera depth is the plane's plus `offset_m`.
+    pub(crate) fn point(&self, pixel: DVec2, offset_m: f64) -> Option<DVec3> {
+        let ray = self.camera.ray(pixel);
+        let on_plane = ray.on_plane(self.anchor_m, self.normal)?;
+        let along = ray.direction.dot(self.forward);
+        let depth = (on_plane - ray.origin).dot(self.forward) + offset_m;
+        let point = ray.origin + ray.direction * (depth / along);
+        (along > 1e-6 && depth > 0.0 && point.is_finite()).then_some(point)
+    }
+}
+
+/// Lifts a player's pixels to a textured mesh on the pitch.
+///
+/// `image` is the frame that `depth` was estimated on. The mesh stands on the pitch: see [`MAX_CORRECTION_M`].
+/// Triangles are counter-clockwise seen from the camera.
+///
+/// # Errors
+/// [`MeshError`] when the depth map is inconsistent, the plane is not seen, or nothing connected remains.
+pub fn lift(
+    image: &RgbImage,
+    camera: &Camera,
+    person_id: PersonId,
+    frame: usize,
+    person: &Person,
+    depth: &DepthMap,
+    budget: &MeshBudget,
+) -> Result<BodySurface, MeshError> {
+    let anchor_m = person.ground_m.with_y(0.0);
+    let plane = VirtualPlane::new(camera, anchor_m).ok_or(MeshError::NoPlane)?;
+    let footprint_m = 1.0 / camera.pixels_per_metre(anchor_m);
+    let mut surface = grid::connect(depth, &plane, footprint_m)?;
+    surface.keep_large_pieces()?;
+    let correction_m = contact::correction(&surface.points_m, person, &plane, footprint_m);
+    let texture = texture::cut_out(image, &depth.mask, &surface.pixels);
+    let positions_m = surface
+        .points_m
+        .iter()
+        .map(|point| (*point - anchor_m + DVec3::Y * correction_m).as_vec3().to_array())
+        .collect();
+    let uvs = surface.pixels.iter().map(|pixel| texture.uv(*pixel)).collect();
+    let mesh = Mesh { positions_m, uvs, triangles: surface.triangles };
+    Ok(BodySurface {
+        person: person_id,
+        frame,
+        anchor_m,
+        mesh: decimate::to_budget(mesh, budget.triangles),
+        texture: texture.image,
+        confidence: person.pose_score.clamp(0.0, 1.0),
+    })
+}
+
+#[cfg(test)]
+mod tests;
