@@ -10,7 +10,7 @@ use crate::pose::Person;
 pub const MAX_CORRECTION_M: f64 = 0.15;
 
 /// The share of points that may lie lower than the sole: stray pixels of grass.
-const STRAY_SHARE: f64 = 0.01;
+const STRAY_SHARE: f64 = 0.003;
 /// BlazePose: ankles, heels, toes.
 const FOOT_JOINTS: std::ops::RangeInclusive<usize> = 27..=32;
 /// Feet are missing from the mask when it ends this far above the lowest foot joint, metres.

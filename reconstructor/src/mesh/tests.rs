@@ -129,10 +129,16 @@ fn a_sphere_keeps_its_shape_under_a_budget() {
         let surface = lift(&image, &camera, PersonId(0), 0, &person_at(anchor_m), &depth, &budget).unwrap();
         assert!(surface.mesh.triangles.len() <= triangles);
         assert!(surface.mesh.triangles.len() * 10 >= triangles * 9, "the budget is used");
-        let mut errors: Vec<f64> =
-            world(&surface).iter().map(|p| (p.distance(centre) - radius_m).abs()).collect();
-        errors.sort_by(f64::total_cmp);
-        assert!(errors[errors.len() * 8 / 10] < 0.015, "80 % within {}", errors[errors.len() * 8 / 10]);
+        // The ball's lowest point is hidden under it, so the body is set down by a little: judge the shape without that.
+        let spread = |down_mm: i32| {
+            let centre = centre - DVec3::Y * f64::from(down_mm) / 1_000.0;
+            let mut errors: Vec<f64> =
+                world(&surface).iter().map(|p| (p.distance(centre) - radius_m).abs()).collect();
+            errors.sort_by(f64::total_cmp);
+            errors[errors.len() * 8 / 10]
+        };
+        let best = (0..40).map(spread).fold(f64::INFINITY, f64::min);
+        assert!(best < 0.01, "80 % within {best}");
     }
 }
 
