@@ -1,1 +1,56 @@
-//! placeholder
+//! Rendered football with ground truth: bodies, motion, stadium and broadcast camera.
+//!
+//! [`dataset`] writes training pictures of single players with their depth; [`synthesize`] renders a whole broadcast
+//! clip with the truth of every frame. Everything is deterministic: the same options give the same bytes.
+
+// Tests may panic: that is how they fail.
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+use std::path::PathBuf;
+
+pub mod body;
+pub mod dataset;
+pub mod figure;
+pub mod gait;
+pub mod lettering;
+pub mod motion;
+mod noise;
+mod npy;
+pub mod outfit;
+mod packed;
+pub mod paint;
+pub mod raster;
+pub mod render;
+pub mod rig;
+pub mod sensor;
+pub mod stadium;
+
+/// Why something could not be rendered or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SynthesisError {
+    /// A baked asset is broken.
+    #[error("{what}: {reason}")]
+    Asset {
+        /// Which file or array.
+        what: String,
+        /// What is wrong with it and what to do.
+        reason: String,
+    },
+    /// A file could not be read or written.
+    #[error("cannot {doing} {}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// "read", "write" or "create".
+        doing: &'static str,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A picture could not be encoded or decoded.
+    #[error("cannot encode a picture: {0}")]
+    Picture(image::ImageError),
+    /// The options contradict each other.
+    #[error("{0}")]
+    Options(String),
+}

@@ -1,0 +1,459 @@
+//! Training and test pictures for the depth network: one player per crop, with mask, depth offset and joints.
+//!
+//! Every sample is drawn from its own seed, so the same options give the same bytes on any machine and thread count.
+//! `Split` holds out whole actions, bodies and kits.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use glam::{DVec2, DVec3, Vec3};
+use image::RgbImage;
+use protocol::{camera::Camera, pitch::Pitch};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::{
+    SynthesisError,
+    body::{BaseBody, Build},
+    figure::{Detail, Figure, dress},
+    gait::{self, Action},
+    motion::{Motions, Pose},
+    npy,
+    outfit::{Kit, Outfit, Srgb},
+    paint::Lights,
+    raster::Grid,
+    render::{Actor, Scene, Window},
+    rig::{self, Placement},
+    sensor::Sensor,
+    stadium::{Board, Stadium},
+};
+
+/// Side of a crop and of its mask, pixels.
+pub const CROP: usize = 256;
+/// Side of the depth offsets: every second pixel of the crop, at crop pixels 0.5, 2.5, 4.5 …
+pub const OFFSETS: usize = 128;
+/// Marks an offset where the person is not seen.
+pub const NO_OFFSET: i16 = i16::MIN;
+
+/// Which players are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Split {
+    /// For training.
+    Train,
+    /// Actions, bodies and kits that training never sees.
+    Test,
+}
+
+/// What to write.
+#[derive(Clone, Debug)]
+pub struct DepthOptions {
+    /// Folder for the shards; made when missing.
+    pub out: PathBuf,
+    /// Samples in all.
+    pub count: usize,
+    /// Samples per shard.
+    pub shard: usize,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// Who is drawn.
+    pub split: Split,
+    /// A file with more motions; the shipped ones when absent.
+    pub motions: Option<PathBuf>,
+    /// Height of the players in the picture, pixels: smallest and largest.
+    pub height_px: [f32; 2],
+}
+
+/// One line of `meta.jsonl`.
+#[derive(Clone, Debug, Serialize)]
+pub struct SampleMeta {
+    /// Index in the whole set.
+    pub index: usize,
+    /// Seed of the sample.
+    pub seed: u64,
+    /// Motion clip or formula.
+    pub motion: String,
+    /// Share of the motion 0..1.
+    pub phase: f32,
+    /// Body.
+    pub body: u32,
+    /// Kit.
+    pub kit: String,
+    /// Camera of the whole 1280×720 picture.
+    pub camera: Camera,
+    /// Clip pixel of the crop's first pixel centre (x, y), and clip pixels per crop pixel.
+    pub crop: [f64; 3],
+    /// Ground point under the hips, world metres.
+    pub anchor_m: [f64; 3],
+    /// Heading about y; 0 looks along +z.
+    pub yaw: f32,
+    /// Height of the person's box in the clip, pixels.
+    pub height_px: f64,
+    /// Share of the person's samples that nobody covers, inside the crop.
+    pub visible_share: f32,
+    /// BlazePose's 33 landmarks in clip pixels.
+    pub joints_px: Vec<[f64; 2]>,
+    /// The same in world metres.
+    pub joints_m: Vec<[f64; 3]>,
+}
+
+/// One sample in memory.
+pub struct Sample {
+    /// RGB, `CROP`².
+    pub crop: RgbImage,
+    /// 255 where the person is in front, `CROP`².
+    pub mask: Vec<u8>,
+    /// Millimetres behind the virtual plane, `OFFSETS`².
+    pub offsets_mm: Vec<i16>,
+    /// The rest.
+    pub meta: SampleMeta,
+}
+
+/// The camera at `position` that sees `target` at `pixel`, horizon level.
+#[must_use]
+pub fn aim(size_px: (u32, u32), focal_px: f64, position: DVec3, target: DVec3, pixel: DVec2) -> Camera {
+    let mut camera = Camera::looking_at(size_px, focal_px, position, target);
+    let n = (pixel - camera.centre_px()) / focal_px;
+    let sight = (target - position).normalize_or(DVec3::NEG_Z);
+    // Along the sight the world's y must come out right: n.y cos(tilt) + sin(tilt) = −sight.y |n|.
+    let length = n.extend(1.0).length();
+    let tilt = ((-sight.y * length) / (1.0 + n.y * n.y).sqrt()).clamp(-1.0, 1.0).asin() - n.y.atan();
+    let ahead = tilt.cos() - n.y * tilt.sin(); // the horizontal part that points ahead; n.x points right
+    let heading = sight.x.atan2(-sight.z) - n.x.atan2(ahead);
+    let forward = DVec3::new(heading.sin() * tilt.cos(), -tilt.sin(), -heading.cos() * tilt.cos());
+    camera = Camera::looking_at(size_px, focal_px, position, position + forward);
+    camera
+}
+
+/// Everything a shard draws from.
+struct Cast {
+    figures: Vec<(Figure, u32)>,
+    stadiums: Vec<Stadium>,
+}
+
+impl Cast {
+    fn new(base: &BaseBody, options: &DepthOptions, shard: usize, size: usize) -> Self {
+        let figures = (0..size)
+            .into_par_iter()
+            .map(|k| {
+                let mut rng = rng(options.seed, &[7, shard as u64, k as u64]);
+                // One body in four and one kit in four belong to the test split.
+                let held_out = |id: u32| (id % 4 == 3) == (options.split == Split::Test);
+                let mut pick = |count: u32| loop {
+                    let id = rng.random_range(0..count);
+                    if held_out(id) {
+                        break id;
+                    }
+                };
+                let (body_id, kit_id) = (pick(4000), pick(1200));
+                let build = Build::random(&mut Pcg64Mcg::seed_from_u64(0xB0D1_0000 + u64::from(body_id)));
+                let mut kit_rng = Pcg64Mcg::seed_from_u64(0x5117_0000 + u64::from(kit_id));
+                let kit = Kit::random(&mut kit_rng, format!("kit{kit_id}"));
+                let number = rng.random_bool(0.85).then(|| rng.random_range(1..40));
+                let outfit = Outfit::random(&mut rng, kit, number);
+                (dress(base, base.shape(&build), outfit, Detail::Close), body_id)
+            })
+            .collect();
+        let stadiums = (0..12)
+            .map(|k| {
+                let mut rng = rng(options.seed, &[8, shard as u64, k]);
+                random_stadium(&mut rng)
+            })
+            .collect();
+        Self { figures, stadiums }
+    }
+}
+
+fn random_stadium(rng: &mut Pcg64Mcg) -> Stadium {
+    const TEXTS: [&str; 8] = [
+        "HOLOPITCH",
+        "TABLETOP",
+        "NORTH BANK",
+        "OPEN GOAL",
+        "EXTRA TIME",
+        "FAIR PLAY",
+        "KICK OFF 20",
+        "LINESMAN",
+    ];
+    let mut colour = || -> Srgb { [0; 3].map(|_| rng.random_range(0.02..0.98f32)) };
+    let boards: Vec<Board> =
+        TEXTS.iter().map(|text| Board { text: (*text).into(), ground: colour(), ink: colour() }).collect();
+    let crowd = (0..4).map(|_| colour()).collect();
+    let lights = if rng.random_bool(0.45) {
+        Lights::floodlights()
+    } else {
+        let around = rng.random_range(0.0..std::f32::consts::TAU);
+        let high = rng.random_range(0.45..1.3f32);
+        Lights::sun(
+            Vec3::new(around.cos() * high.cos(), high.sin(), around.sin() * high.cos()),
+            rng.random_range(0.0..1.0),
+        )
+    };
+    let seed = rng.random();
+    let mut stadium = Stadium::new(Pitch::default(), boards, lights, seed);
+    let base = [[0.33, 0.47, 0.16], [0.28, 0.45, 0.20], [0.42, 0.50, 0.22], [0.22, 0.40, 0.17]];
+    let grass: [f32; 3] = base[rng.random_range(0..base.len())];
+    stadium.grass = grass.map(|c| c * rng.random_range(0.9..1.1f32));
+    stadium.mowing = rng.random_range(0.0..0.3);
+    stadium.crowd = crowd;
+    stadium.stands_light = rng.random_range(0.25..0.9);
+    stadium.apron = if rng.random_bool(0.5) { stadium.grass } else { [0.45, 0.25, 0.2] };
+    stadium
+}
+
+fn rng(seed: u64, path: &[u64]) -> Pcg64Mcg {
+    let mix = path.iter().fold(seed ^ 0x9E37_79B9_7F4A_7C15, |state, &step| {
+        (state ^ step.wrapping_mul(0xD6E8_FEB8_6659_FD93)).wrapping_mul(0xA076_1D64_78BD_642F).rotate_left(29)
+    });
+    Pcg64Mcg::seed_from_u64(mix)
+}
+
+fn draw_pose(actions: &[Action<'_>], rng: &mut Pcg64Mcg) -> (String, f32, Pose) {
+    let phase = rng.random_range(0.0..1.0);
+    let mood = rng.random_range(0.0..1.0);
+    match gait::draw(actions, rng) {
+        Some(action) => {
+            let strength = if rng.random_bool(0.8) { 1.0 } else { 0.0 };
+            (action.name.clone(), phase, gait::personal(action.pose(phase, mood), strength, rng))
+        }
+        None => ("none".into(), 0.0, Pose::default()),
+    }
+}
+
+/// Renders one sample.
+fn sample(
+    options: &DepthOptions,
+    index: usize,
+    cast: &Cast,
+    actions: &[Action<'_>],
+) -> Result<Sample, SynthesisError> {
+    let seed = options.seed.wrapping_mul(1_000_003).wrapping_add(index as u64);
+    let rng = &mut rng(options.seed, &[9, index as u64]);
+    let stadium = &cast.stadiums[rng.random_range(0..cast.stadiums.len())];
+    let main = rng.random_range(0..cast.figures.len());
+    let (motion, phase, pose) = draw_pose(actions, rng);
+
+    // Where the player stands and where the camera is.
+    let (position, anchor) = loop {
+        let aside = if rng.random_bool(0.8) { 10.0 } else { 45.0 };
+        let position = DVec3::new(
+            rng.random_range(-aside..aside),
+            rng.random_range(8.0..25.0),
+            34.0 + rng.random_range(8.0..48.0),
+        );
+        let anchor = DVec3::new(rng.random_range(-51.0..51.0), 0.0, rng.random_range(-33.0..33.5));
+        if (30.0..115.0).contains(&position.distance(anchor)) {
+            break (position, anchor);
+        }
+    };
+    let yaw = rng.random_range(-std::f32::consts::PI..std::f32::consts::PI);
+    let placement = Placement { anchor_m: anchor.as_vec3(), yaw };
+    let posed = rig::pose(&cast.figures[main].0, &pose).placed(&placement);
+
+    let [low, high] = options.height_px;
+    let wanted_px = f64::from(low * (high / low).powf(rng.random_range(0.0..1.0f32)));
+    let focal = wanted_px * position.distance(anchor) / 1.78;
+    let pixel = DVec2::new(rng.random_range(60.0..1220.0), rng.random_range(150.0..690.0));
+    let camera = aim((1280, 720), focal, position, anchor, pixel);
+
+    let mut actors = vec![Actor { figure: &cast.figures[main].0, posed }];
+    if rng.random_bool(0.4) {
+        for _ in 0..rng.random_range(1..3) {
+            let other = rng.random_range(0..cast.figures.len());
+            let (_, _, pose) = draw_pose(actions, rng);
+            let (away, around) =
+                (rng.random_range(0.55..2.6f32), rng.random_range(0.0..std::f32::consts::TAU));
+            let place = Placement {
+                anchor_m: placement.anchor_m + Vec3::new(around.cos(), 0.0, around.sin()) * away,
+                yaw: rng.random_range(-3.2..3.2),
+            };
+            let figure = &cast.figures[other].0;
+            actors.push(Actor { figure, posed: rig::pose(figure, &pose).placed(&place) });
+        }
+    }
+    let joints = actors[0].posed.landmarks.clone();
+    let scene = Scene { stadium, actors, solids: Vec::new() };
+
+    // The crop: the box of the whole person, hidden parts too, made square and a quarter larger.
+    let (mut least, mut most) = (DVec2::MAX, DVec2::MIN);
+    for pixel in scene.actors[0].posed.positions.iter().filter_map(|p| camera.project(p.as_dvec3())) {
+        least = least.min(pixel);
+        most = most.max(pixel);
+    }
+    let (mut centre, mut side) = ((least + most) / 2.0, (most - least).max_element() * 1.25);
+    if options.split == Split::Train {
+        // The detector's boxes are never exact.
+        side *= rng.random_range(0.93..1.12);
+        centre += DVec2::new(rng.random_range(-0.04..0.04), rng.random_range(-0.04..0.04)) * side;
+    }
+    let scale = side / CROP as f64;
+    let corner = centre - DVec2::splat(scale * (CROP as f64 - 1.0) / 2.0);
+
+    // Render the native pixels round the crop, on the codec's blocks of eight, then enlarge.
+    let first = [corner.x, corner.y].map(|c| (((c - 3.0) / 8.0).floor() * 8.0) as i32);
+    let last = [corner.x, corner.y].map(|c| (c + side + 3.0).ceil() as i32);
+    let window =
+        Window { first, size: [0, 1].map(|k| ((last[k] - first[k]).max(8) as usize).div_ceil(8) * 8) };
+    let fine = if side > 120.0 { 2 } else { 3 };
+    let light = scene.render(&camera, window, fine);
+    let native = Sensor::random(rng).expose(&light, rng)?;
+    let crop = enlarge(&native, [corner.x - f64::from(first[0]), corner.y - f64::from(first[1])], scale);
+
+    let grid = Grid { origin_px: corner.to_array(), per_px: 1.0 / scale, width: CROP, height: CROP };
+    let hits = scene.first_hits(&camera, grid);
+    let mask: Vec<u8> = hits.iter().map(|hit| if matches!(hit, Some((0, _))) { 255 } else { 0 }).collect();
+    let alone = Scene { stadium, actors: scene.actors[..1].to_vec(), solids: Vec::new() };
+    let whole = if scene.actors.len() > 1 {
+        alone.first_hits(&camera, grid).iter().flatten().count()
+    } else {
+        hits.iter().flatten().count()
+    };
+    let visible = mask.iter().filter(|&&m| m > 0).count();
+
+    let half = Grid {
+        origin_px: (corner + DVec2::splat(0.5 * scale)).to_array(),
+        per_px: 0.5 / scale,
+        width: OFFSETS,
+        height: OFFSETS,
+    };
+    let offsets_mm = scene
+        .first_hits(&camera, half)
+        .iter()
+        .enumerate()
+        .map(|(place, hit)| match hit {
+            Some((0, depth)) => {
+                let pixel = half.pixel(place % OFFSETS, place / OFFSETS);
+                let offset = f64::from(*depth) - plane_depth(&camera, anchor, pixel.into());
+                (offset * 1000.0).round().clamp(-32_000.0, 32_000.0) as i16
+            }
+            _ => NO_OFFSET,
+        })
+        .collect();
+
+    let meta = SampleMeta {
+        index,
+        seed,
+        motion,
+        phase,
+        body: cast.figures[main].1,
+        kit: cast.figures[main].0.outfit.kit.id.clone(),
+        camera,
+        crop: [corner.x, corner.y, scale],
+        anchor_m: anchor.to_array(),
+        yaw,
+        height_px: most.y - least.y,
+        visible_share: visible as f32 / whole.max(1) as f32,
+        joints_px: joints
+            .iter()
+            .map(|j| camera.project(j.as_dvec3()).unwrap_or(DVec2::splat(-1e4)).to_array())
+            .collect(),
+        joints_m: joints.iter().map(|j| j.as_dvec3().to_array()).collect(),
+    };
+    Ok(Sample { crop, mask, offsets_mm, meta })
+}
+
+/// Depth along the optical axis of the virtual plane of `anchor` at a pixel: the upright plane through the anchor
+/// that faces the camera.
+#[must_use]
+pub fn plane_depth(camera: &Camera, anchor: DVec3, pixel: DVec2) -> f64 {
+    let towards = camera.position - anchor;
+    let normal = DVec3::new(towards.x, 0.0, towards.z).normalize_or(DVec3::Z);
+    let ray = camera.ray(pixel);
+    let distance = (anchor - ray.origin).dot(normal) / ray.direction.dot(normal);
+    distance * ray.direction.dot(camera.forward())
+}
+
+/// Bilinear samples of `image` at `corner + scale · (u, v)`.
+fn enlarge(image: &RgbImage, corner: [f64; 2], scale: f64) -> RgbImage {
+    let (width, height) = image.dimensions();
+    RgbImage::from_fn(CROP as u32, CROP as u32, |u, v| {
+        let x = (corner[0] + scale * f64::from(u)).clamp(0.0, f64::from(width - 1)) as f32;
+        let y = (corner[1] + scale * f64::from(v)).clamp(0.0, f64::from(height - 1)) as f32;
+        let (x0, y0) = (x as u32, y as u32);
+        let (x1, y1) = ((x0 + 1).min(width - 1), (y0 + 1).min(height - 1));
+        let (fx, fy) = (x - x0 as f32, y - y0 as f32);
+        let [a, b, c, d] =
+            [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].map(|(x, y)| image.get_pixel(x, y).0.map(f32::from));
+        image::Rgb([0, 1, 2].map(|k| {
+            let top = a[k] + (b[k] - a[k]) * fx;
+            let bottom = c[k] + (d[k] - c[k]) * fx;
+            (top + (bottom - top) * fy + 0.5) as u8
+        }))
+    })
+}
+
+/// Writes the shards; `progress` is called with the number of finished samples. A finished shard (its `meta.jsonl` is
+/// written last) is kept when the command runs again.
+pub fn depth_crops(options: &DepthOptions, progress: impl Fn(usize) + Sync) -> Result<(), SynthesisError> {
+    let [low, high] = options.height_px;
+    if options.shard == 0 || options.count == 0 || !(low > 4.0 && high >= low && high < 1000.0) {
+        return Err(SynthesisError::Options(
+            "count, shard size and player heights must be positive and in order".into(),
+        ));
+    }
+    let base = BaseBody::load()?;
+    let motions = match &options.motions {
+        Some(path) => Motions::open(path)?,
+        None => Motions::shipped()?,
+    };
+    let actions = gait::repertoire(&motions, options.split == Split::Test);
+    for (shard, first) in (0..options.count).step_by(options.shard).enumerate() {
+        let folder = options.out.join(format!("shard-{shard:04}"));
+        let last = (first + options.shard).min(options.count);
+        if folder.join("meta.jsonl").exists() {
+            progress(last);
+            continue;
+        }
+        create(&folder)?;
+        let cast = Cast::new(&base, options, shard, (options.shard / 5).clamp(8, 128));
+        let samples: Vec<Sample> = (first..last)
+            .into_par_iter()
+            .map(|index| {
+                let made = sample(options, index, &cast, &actions);
+                progress(index + 1);
+                made
+            })
+            .collect::<Result<_, _>>()?;
+        write_shard(&folder, &samples)?;
+    }
+    Ok(())
+}
+
+fn create(folder: &Path) -> Result<(), SynthesisError> {
+    std::fs::create_dir_all(folder).map_err(|source| SynthesisError::Io {
+        path: folder.to_owned(),
+        doing: "create",
+        source,
+    })
+}
+
+fn write_shard(folder: &Path, samples: &[Sample]) -> Result<(), SynthesisError> {
+    let count = samples.len();
+    let crops: Vec<u8> = samples.iter().flat_map(|s| s.crop.as_raw().iter().copied()).collect();
+    npy::write(&folder.join("crops.npy"), "|u1", &[count, CROP, CROP, 3], &crops)?;
+    let masks: Vec<u8> = samples.iter().flat_map(|s| s.mask.iter().copied()).collect();
+    npy::write(&folder.join("mask.npy"), "|u1", &[count, CROP, CROP], &masks)?;
+    let offsets: Vec<u8> =
+        samples.iter().flat_map(|s| s.offsets_mm.iter().flat_map(|o| o.to_le_bytes())).collect();
+    npy::write(&folder.join("offset_mm.npy"), "<i2", &[count, OFFSETS, OFFSETS], &offsets)?;
+    let mut lines = Vec::new();
+    for sample in samples {
+        serde_json::to_writer(&mut lines, &sample.meta)
+            .map_err(|error| SynthesisError::Options(error.to_string()))?;
+        lines.push(b'\n');
+    }
+    let path = folder.join("meta.jsonl");
+    let written = tempfile_beside(&path).and_then(|(mut file, temporary)| {
+        file.write_all(&lines)?;
+        std::fs::rename(temporary, &path)
+    });
+    written.map_err(|source| SynthesisError::Io { path, doing: "write", source })
+}
+
+fn tempfile_beside(path: &Path) -> std::io::Result<(std::fs::File, PathBuf)> {
+    let temporary = path.with_extension("partial");
+    Ok((std::fs::File::create(&temporary)?, temporary))
+}

@@ -1,0 +1,235 @@
+//! What a person wears and looks like: kit colours and patterns, cut of the clothes, hair, skin.
+//! Colours are sRGB as a viewer would name them; [`linear`] turns them into light.
+
+use glam::Vec3;
+use rand::{Rng, seq::IndexedRandom};
+
+use crate::body::Build;
+
+/// An sRGB colour, 0..1 per channel.
+pub type Srgb = [f32; 3];
+
+/// sRGB to linear light.
+#[must_use]
+pub fn linear(colour: Srgb) -> Vec3 {
+    Vec3::from(colour.map(|c| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }))
+}
+
+/// Linear light to sRGB.
+#[must_use]
+pub fn to_srgb(light: Vec3) -> Srgb {
+    light.to_array().map(|c| {
+        let c = c.clamp(0.0, 1.0);
+        if c <= 0.003_130_8 { c * 12.92 } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
+    })
+}
+
+/// The pattern of a shirt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pattern {
+    /// One colour.
+    Plain,
+    /// Upright stripes this wide, metres.
+    Stripes(f32),
+    /// Hoops this high, metres.
+    Hoops(f32),
+    /// Left half in the second colour.
+    Halves,
+    /// Sleeves in the second colour.
+    Sleeves,
+    /// One diagonal band this wide, metres.
+    Sash(f32),
+}
+
+/// The colours of a team.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kit {
+    /// Name, for the truth file and for holding kits out.
+    pub id: String,
+    /// Main colour of the shirt.
+    pub shirt: Srgb,
+    /// Second colour of the shirt.
+    pub second: Srgb,
+    /// How they are laid out.
+    pub pattern: Pattern,
+    /// Cuffs and collar.
+    pub trim: Srgb,
+    /// Shorts.
+    pub shorts: Srgb,
+    /// Socks.
+    pub socks: Srgb,
+    /// The number on the back.
+    pub number: Srgb,
+}
+
+/// How long the sleeves are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Sleeves {
+    Short,
+    Long,
+}
+
+/// A hair style: the scalp, lifted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hair {
+    /// Colour.
+    pub colour: Srgb,
+    /// How far it stands off the scalp, metres.
+    pub volume_m: f32,
+    /// Height of the hairline over the head joint at the forehead, metres.
+    pub forehead_m: f32,
+    /// How far below the head joint it hangs at the nape, metres.
+    pub nape_m: f32,
+}
+
+/// Everything about a person's looks but the build.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outfit {
+    /// Team colours.
+    pub kit: Kit,
+    /// Number on the back and shorts.
+    pub number: Option<u8>,
+    /// Skin.
+    pub skin: Srgb,
+    /// Hair; `None` is bald.
+    pub hair: Option<Hair>,
+    /// Boots.
+    pub boots: Srgb,
+    /// Sleeve length.
+    pub sleeves: Sleeves,
+    /// Length of a short sleeve as a share of the upper arm.
+    pub sleeve_share: f32,
+    /// How far the shirt reaches below the hip joints, metres.
+    pub shirt_length_m: f32,
+    /// How far above the knee the shorts end, metres.
+    pub shorts_above_knee_m: f32,
+    /// How far below the knee the socks end, metres.
+    pub sock_below_knee_m: f32,
+    /// How loosely the clothes hang, metres off the body.
+    pub looseness_m: f32,
+}
+
+const SKINS: [Srgb; 7] = [
+    [0.93, 0.76, 0.66],
+    [0.88, 0.68, 0.56],
+    [0.80, 0.60, 0.46],
+    [0.68, 0.48, 0.35],
+    [0.53, 0.35, 0.25],
+    [0.40, 0.26, 0.19],
+    [0.29, 0.19, 0.15],
+];
+const HAIRS: [Srgb; 6] = [
+    [0.07, 0.06, 0.06],
+    [0.12, 0.09, 0.07],
+    [0.22, 0.15, 0.10],
+    [0.38, 0.26, 0.16],
+    [0.70, 0.55, 0.33],
+    [0.45, 0.22, 0.12],
+];
+const BOOTS: [Srgb; 7] = [
+    [0.05, 0.05, 0.06],
+    [0.95, 0.95, 0.95],
+    [0.95, 0.30, 0.10],
+    [0.80, 0.95, 0.15],
+    [0.95, 0.20, 0.50],
+    [0.15, 0.45, 0.95],
+    [0.95, 0.80, 0.15],
+];
+
+impl Build {
+    /// A random adult player.
+    pub fn random(rng: &mut impl Rng) -> Self {
+        let raw = [0; 3].map(|_| rng.random_range(0.05..1.0f32));
+        let sum: f32 = raw.iter().sum();
+        Self {
+            female: if rng.random_bool(0.15) { 1.0 } else { 0.0 },
+            origin: raw.map(|share| share / sum),
+            muscle: rng.random_range(-0.2..0.6),
+            weight: rng.random_range(-0.6..0.35),
+            height_m: rng.random_range(1.68..1.96),
+        }
+    }
+}
+
+impl Outfit {
+    /// A random person in `kit`.
+    pub fn random(rng: &mut impl Rng, kit: Kit, number: Option<u8>) -> Self {
+        let tone = rng.random_range(0..SKINS.len());
+        let skin = SKINS[tone].map(|c| (c * rng.random_range(0.94..1.06f32)).min(1.0));
+        // Fair hair on dark skin is rare.
+        let hair_choices = if tone >= 3 { 3 } else { HAIRS.len() };
+        let hair = (!rng.random_bool(0.1)).then(|| Hair {
+            colour: HAIRS[rng.random_range(0..hair_choices)],
+            volume_m: *[0.004, 0.008, 0.014, 0.02, 0.03].choose(rng).unwrap_or(&0.01),
+            forehead_m: rng.random_range(0.135..0.16),
+            nape_m: if rng.random_bool(0.2) { 0.06 } else { 0.0 },
+        });
+        Self {
+            kit,
+            number,
+            skin,
+            hair,
+            boots: *BOOTS.choose(rng).unwrap_or(&BOOTS[0]),
+            sleeves: if rng.random_bool(0.15) { Sleeves::Long } else { Sleeves::Short },
+            sleeve_share: rng.random_range(0.62..0.92),
+            shirt_length_m: rng.random_range(0.03..0.10),
+            shorts_above_knee_m: rng.random_range(0.08..0.17),
+            sock_below_knee_m: rng.random_range(0.03..0.09),
+            looseness_m: rng.random_range(0.008..0.024),
+        }
+    }
+}
+
+impl Kit {
+    /// A random kit with believable colours; `id` names it.
+    pub fn random(rng: &mut impl Rng, id: String) -> Self {
+        const PALETTE: [Srgb; 16] = [
+            [0.95, 0.95, 0.96],
+            [0.06, 0.06, 0.07],
+            [0.75, 0.08, 0.12],
+            [0.48, 0.07, 0.15],
+            [0.08, 0.16, 0.55],
+            [0.05, 0.08, 0.25],
+            [0.35, 0.65, 0.90],
+            [0.95, 0.85, 0.10],
+            [0.95, 0.50, 0.08],
+            [0.05, 0.40, 0.18],
+            [0.40, 0.15, 0.50],
+            [0.90, 0.45, 0.60],
+            [0.20, 0.75, 0.70],
+            [0.55, 0.57, 0.60],
+            [0.70, 0.90, 0.20],
+            [0.40, 0.25, 0.15],
+        ];
+        let mut pick = |share_white: f64| -> Srgb {
+            if rng.random_bool(share_white) {
+                return PALETTE[0];
+            }
+            let colour = *PALETTE.choose(rng).unwrap_or(&PALETTE[0]);
+            colour.map(|c| (c * rng.random_range(0.85..1.1f32)).clamp(0.03, 0.97))
+        };
+        let (shirt, second, trim) = (pick(0.15), pick(0.3), pick(0.3));
+        let (shorts, socks) = (pick(0.3), pick(0.2));
+        let pattern = match rng.random_range(0..10) {
+            0..5 => Pattern::Plain,
+            5 | 6 => Pattern::Stripes(rng.random_range(0.04..0.1)),
+            7 => Pattern::Hoops(rng.random_range(0.05..0.12)),
+            8 => Pattern::Sleeves,
+            _ if rng.random_bool(0.5) => Pattern::Halves,
+            _ => Pattern::Sash(rng.random_range(0.08..0.16)),
+        };
+        let bright = shirt.iter().sum::<f32>() / 3.0;
+        let number = if bright > 0.5 { [0.05, 0.05, 0.08] } else { [0.95, 0.95, 0.95] };
+        Self {
+            id,
+            shirt,
+            second,
+            pattern,
+            trim,
+            shorts: if rng.random_bool(0.35) { shirt } else { shorts },
+            socks: if rng.random_bool(0.5) { shirt } else { socks },
+            number,
+        }
+    }
+}
