@@ -1,0 +1,115 @@
+//! The timeline and the row of buttons. Every control has a name for assistive technology.
+
+use egui::{Button, ComboBox, Response, Slider, Ui, WidgetInfo};
+
+use super::Look;
+use crate::{
+    camera::Preset,
+    session::Session,
+    timeline::{Nanoseconds, Speed},
+};
+
+/// The slider over the whole match.
+pub(super) fn timeline(ui: &mut Ui, session: &mut Session, now: Nanoseconds) {
+    let Some(timeline) = session.timeline().copied() else {
+        ui.add_enabled_ui(false, |ui| slider(ui, &mut 0, 0));
+        return;
+    };
+    let mut frame = timeline.frame_at(session.head().position());
+    if slider(ui, &mut frame, timeline.frames() - 1).changed() {
+        session.seek(frame, now);
+    }
+}
+
+fn slider(ui: &mut Ui, frame: &mut u32, last: u32) -> Response {
+    ui.spacing_mut().slider_width = ui.available_width();
+    let response = ui.add(Slider::new(frame, 0..=last.max(1)).show_value(false).trailing_fill(true));
+    let value = f64::from(*frame);
+    let enabled = response.enabled();
+    response.widget_info(|| WidgetInfo::slider(enabled, value, "Timeline"));
+    response
+}
+
+/// Play, step, speed, camera and where we are.
+pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: Nanoseconds) {
+    ui.horizontal(|ui| {
+        let ready = session.timeline().is_some();
+        let playing = session.head().is_playing();
+        if button(ui, ready, "⏮", "First frame").clicked() {
+            session.seek(0, now);
+        }
+        if button(ui, ready, "⏪", "Step back").clicked() {
+            session.step(-1);
+        }
+        let (icon, name) = if playing { ("⏸", "Pause") } else { ("▶", "Play") };
+        if button(ui, ready, icon, name).clicked() {
+            session.toggle(now);
+        }
+        if button(ui, ready, "⏩", "Step forward").clicked() {
+            session.step(1);
+        }
+        if button(ui, ready, "⏭", "Last frame").clicked() {
+            session.seek(u32::MAX, now);
+        }
+        ui.add_space(8.0);
+        speed_menu(ui, session, now);
+        camera_menu(ui, look);
+        ui.add_space(8.0);
+        ui.label(position(session));
+    });
+}
+
+/// "0:01.23 / 0:10.00 · frame 37 of 300 · clip frame 187"
+fn position(session: &Session) -> String {
+    let Some(timeline) = session.timeline() else { return "–".to_owned() };
+    let moment = timeline.label(session.head().position());
+    let length = timeline.label(timeline.duration);
+    let Some(shown) = session.shown() else { return format!("{moment} / {length}") };
+    format!(
+        "{moment} / {length} · frame {} of {} · clip frame {}",
+        shown.frame,
+        timeline.frames(),
+        shown.scene.clip_frame
+    )
+}
+
+fn button(ui: &mut Ui, enabled: bool, icon: &str, name: &str) -> Response {
+    let response = ui.add_enabled(enabled, Button::new(icon).min_size(egui::vec2(30.0, 24.0)));
+    response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, enabled, name));
+    response.on_hover_text(name)
+}
+
+fn speed_menu(ui: &mut Ui, session: &mut Session, now: Nanoseconds) {
+    let speed = session.head().speed();
+    let menu = ComboBox::from_id_salt("speed").width(64.0).selected_text(speed.label()).show_ui(ui, |ui| {
+        for choice in Speed::ALL {
+            if ui.selectable_label(choice == speed, choice.label()).clicked() {
+                session.set_speed(choice, now);
+            }
+        }
+    });
+    name_menu(&menu.response, "Speed", &speed.label());
+}
+
+fn camera_menu(ui: &mut Ui, look: &mut Look) {
+    let current = match look {
+        Look::Preset(preset) => preset.label(),
+        Look::Orbit(_) => "Free",
+    };
+    let menu = ComboBox::from_id_salt("camera").width(104.0).selected_text(current).show_ui(ui, |ui| {
+        for preset in Preset::ALL {
+            if ui.selectable_label(*look == Look::Preset(preset), preset.label()).clicked() {
+                *look = Look::Preset(preset);
+            }
+        }
+    });
+    name_menu(&menu.response, "Camera", current);
+}
+
+fn name_menu(response: &Response, name: &str, value: &str) {
+    response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(egui::Role::ComboBox, true, name);
+        info.current_text_value = Some(value.to_owned());
+        info
+    });
+}

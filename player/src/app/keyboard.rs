@@ -1,0 +1,28 @@
+//! The keys: space plays, arrows step, Home and End go to the ends.
+
+use egui::{Key, Modifiers, Ui};
+
+use crate::{session::Session, timeline::Nanoseconds};
+
+/// Takes the keys out of the input before a focused widget sees them: space would press the last clicked button.
+pub(super) fn apply(ui: &Ui, session: &mut Session, now: Nanoseconds) {
+    let pressed = |modifiers: Modifiers, key: Key| {
+        ui.input_mut(|input| input.count_and_consume_key(modifiers, key)) as i64
+    };
+    if pressed(Modifiers::NONE, Key::Space) % 2 == 1 {
+        session.toggle(now);
+    }
+    let steps = pressed(Modifiers::SHIFT, Key::ArrowRight) * 10
+        - pressed(Modifiers::SHIFT, Key::ArrowLeft) * 10
+        + pressed(Modifiers::NONE, Key::ArrowRight)
+        - pressed(Modifiers::NONE, Key::ArrowLeft);
+    if steps != 0 {
+        session.step(steps);
+    }
+    if pressed(Modifiers::NONE, Key::Home) > 0 {
+        session.seek(0, now);
+    }
+    if pressed(Modifiers::NONE, Key::End) > 0 {
+        session.seek(u32::MAX, now);
+    }
+}

@@ -1,0 +1,139 @@
+//! The desktop window: the table in the middle, the timeline and the controls below.
+//!
+//! Fetching and decoding happen in the session's threads; this thread only asks, uploads and draws.
+
+mod controls;
+mod keyboard;
+mod scene_view;
+
+use std::time::Instant;
+
+use egui::{CentralPanel, Color32, Panel, RichText, Ui};
+use protocol::pitch::Pitch;
+
+use crate::{
+    camera::{OrbitCamera, Preset},
+    session::Session,
+    source::Location,
+    timeline::Nanoseconds,
+};
+use scene_view::SceneView;
+
+/// Asks egui to come back this soon while something is loading or playing.
+const REPAINT: std::time::Duration = std::time::Duration::from_millis(8);
+
+/// How the table is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Look {
+    /// A preset; the broadcast one follows the clip's camera frame by frame.
+    Preset(Preset),
+    /// The mouse has it.
+    Orbit(OrbitCamera),
+}
+
+/// The application.
+pub struct PlayerApp {
+    name: String,
+    session: Session,
+    view: Option<SceneView>,
+    look: Look,
+    started: Instant,
+}
+
+impl PlayerApp {
+    /// Shows the stream at `location`, loaded by `session`. Without a graphics device there are controls but no table.
+    #[must_use]
+    pub fn new(context: &eframe::CreationContext<'_>, location: &Location, session: Session) -> Self {
+        context.egui_ctx.set_theme(egui::Theme::Dark);
+        Self {
+            name: location.name_of(""),
+            session,
+            view: context.wgpu_render_state.clone().map(SceneView::new),
+            look: Look::Preset(Preset::Table),
+            started: Instant::now(),
+        }
+    }
+
+    /// What is being watched.
+    #[must_use]
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// Plays, if it does not already.
+    pub fn play(&mut self) {
+        if !self.session.head().is_playing() {
+            let now = self.now();
+            self.session.toggle(now);
+        }
+    }
+
+    fn now(&self) -> Nanoseconds {
+        u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX)
+    }
+
+    fn pitch(&self) -> Pitch {
+        self.session.manifest().map_or_else(Pitch::default, |manifest| manifest.pitch)
+    }
+
+    /// One line under the controls: what is on show, or what is wrong.
+    fn status(&self) -> (String, Color32) {
+        let quiet = Color32::from_gray(150);
+        if let Some(problem) = self.session.problem() {
+            return (problem.to_owned(), Color32::from_rgb(240, 170, 90));
+        }
+        let Some(shown) = self.session.shown() else {
+            return (format!("Opening {} …", self.name), quiet);
+        };
+        let mut parts = vec![format!("{} people", shown.scene.people)];
+        if let Some(residual) = shown.quality.line_residual_px {
+            parts.push(format!("lines fit to {residual:.1} px"));
+        }
+        if let Some(confidence) = shown.quality.track_confidence {
+            parts.push(format!("tracks {:.0} % sure", confidence * 100.0));
+        }
+        if self.session.is_waiting() {
+            parts.push("loading …".to_owned());
+        }
+        if self.look == Look::Preset(Preset::Broadcast) && shown.scene.camera.is_none() {
+            parts.push("this frame has no broadcast camera".to_owned());
+        }
+        (parts.join(" · "), quiet)
+    }
+}
+
+impl eframe::App for PlayerApp {
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let now = self.now();
+        keyboard::apply(ui, &mut self.session, now);
+        let changed = self.session.update(now);
+        if let (true, Some(view), Some(shown)) = (changed, &mut self.view, self.session.shown()) {
+            view.show_frame(&shown.scene);
+        }
+        Panel::bottom("controls").show(ui, |ui| {
+            ui.add_space(6.0);
+            controls::timeline(ui, &mut self.session, now);
+            controls::buttons(ui, &mut self.session, &mut self.look, now);
+            let (status, colour) = self.status();
+            ui.add(egui::Label::new(RichText::new(status).color(colour).small()).wrap());
+            ui.add_space(4.0);
+        });
+        let pitch = self.pitch();
+        CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| match &mut self.view {
+            Some(view) => {
+                let camera = self.session.shown().and_then(|shown| shown.scene.camera);
+                view.ui(ui, &pitch, camera.as_ref(), &mut self.look);
+            }
+            None => {
+                ui.centered_and_justified(|ui| {
+                    ui.label("No graphics device: the table cannot be drawn. Install a Vulkan driver.");
+                });
+            }
+        });
+        if self.session.head().is_playing() || self.session.is_waiting() {
+            ui.ctx().request_repaint_after(REPAINT);
+        } else if self.session.problem().is_some() {
+            ui.ctx().request_repaint_after(std::time::Duration::from_millis(500));
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! `player render`: one frame of a stream as a PNG.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use player::{
+    camera::{CameraFile, Preset, ViewCamera},
+    offscreen::Offscreen,
+    scene::{FrameScene, Stage},
+    source::Stream,
+};
+use protocol::{camera::Camera, chunk::ChunkFrame, pitch::Pitch};
+use tokio::runtime::Runtime;
+
+const EXAMPLES: &str = "Examples:
+  player render target/demo/stream --frame 60 --camera top --size 1280x720 --out top.png
+  player render http://localhost:8080/ --frame 0 --camera goal-left --size 960x540 --out goal.png
+  player render target/demo/stream --frame 0 --camera my-camera.json --size 960x540 --out mine.png
+
+A camera file holds {\"position_m\": [0, 25, 80], \"target_m\": [10, 0, 0], \"vertical_fov_degrees\": 30}
+(world metres, y up, z towards the main camera) or a pinhole camera as the stream has it.
+The broadcast view is the pinhole of the clip's camera; its radial distortion is left out.";
+
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct RenderArguments {
+    #[command(flatten)]
+    stream: super::StreamArgument,
+    /// Index of the frame in the stream: the first is 0, whatever its number in the clip.
+    #[arg(long)]
+    frame: u32,
+    /// table, broadcast, top, goal-left, goal-right, or a JSON file.
+    #[arg(long, value_name = "NAME|FILE", value_parser = parse_camera)]
+    camera: CameraArgument,
+    /// Width and height of the picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = super::parse_size)]
+    size: (u32, u32),
+    /// Where the PNG goes.
+    #[arg(long, value_name = "PNG")]
+    out: PathBuf,
+}
+
+#[derive(Clone)]
+enum CameraArgument {
+    Preset(Preset),
+    File(PathBuf),
+}
+
+fn parse_camera(text: &str) -> Result<CameraArgument, String> {
+    if text.ends_with(".json") || text.contains(['/', '\\']) {
+        return Ok(CameraArgument::File(text.into()));
+    }
+    text.parse().map(CameraArgument::Preset).map_err(|error: player::camera::NoSuchPreset| error.to_string())
+}
+
+pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
+    let (runtime, stream) = super::open(&arguments.stream.stream)?;
+    let (chunk_name, frame) = find_frame(&runtime, &stream, arguments.frame)?;
+    let pitch = stream.manifest.pitch;
+    let aspect = f64::from(arguments.size.0) / f64::from(arguments.size.1);
+    let camera = view(&arguments.camera, &pitch, frame.camera.as_ref(), aspect)
+        .with_context(|| format!("frame {} of {}", arguments.frame, arguments.stream.stream))?;
+    let scene = FrameScene::new(&frame, &stream.manifest.people, stream.limits())
+        .with_context(|| format!("{chunk_name}, frame {}", arguments.frame))?;
+    let picture = Offscreen::open()?.picture(&Stage::new(pitch), &scene, &camera, arguments.size)?;
+    picture.save(&arguments.out).with_context(|| {
+        format!("{}: cannot be written: give a name that ends in .png", arguments.out.display())
+    })
+}
+
+fn view(
+    camera: &CameraArgument,
+    pitch: &Pitch,
+    broadcast: Option<&Camera>,
+    aspect: f64,
+) -> anyhow::Result<ViewCamera> {
+    match camera {
+        CameraArgument::Preset(preset) => preset
+            .view(pitch, broadcast, aspect)
+            .context("the stream has no broadcast camera for this frame: use another --camera"),
+        CameraArgument::File(path) => {
+            let text = std::fs::read_to_string(path)
+                .with_context(|| format!("{}: the camera file cannot be read", path.display()))?;
+            let file = CameraFile::from_json(&text).with_context(|| path.display().to_string())?;
+            Ok(file.view(aspect))
+        }
+    }
+}
+
+/// The frame with an index in the stream. Frames may last unevenly, so chunks before it are opened to count theirs.
+fn find_frame(runtime: &Runtime, stream: &Stream, wanted: u32) -> anyhow::Result<(String, ChunkFrame)> {
+    let mut first = 0_usize;
+    for index in 0..stream.chunks().len() {
+        let loaded = runtime.block_on(stream.chunk(index))?;
+        let count = loaded.chunk.frames.len();
+        if let Some(frame) = loaded.chunk.frames.into_iter().nth(wanted as usize - first) {
+            return Ok((stream.chunk_name(index), frame));
+        }
+        first += count;
+    }
+    let name = stream.location().name_of("");
+    bail!("{name}: there is no frame {wanted}: the stream has frames 0 to {}", first.saturating_sub(1));
+}

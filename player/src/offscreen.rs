@@ -1,0 +1,197 @@
+//! Pictures without a window: finds a graphics adapter, draws, and reads the pixels back.
+
+use std::{
+    future::Future,
+    pin::pin,
+    sync::Arc,
+    task::{Context, Poll, Wake, Waker},
+    thread::{self, Thread},
+};
+
+use image::RgbaImage;
+use thiserror::Error;
+use wgpu::{
+    BufferDescriptor, BufferUsages, Device, DeviceDescriptor, Extent3d, Instance, InstanceDescriptor,
+    MapMode, Origin3d, PollType, Queue, RequestAdapterOptions, TexelCopyBufferInfo, TexelCopyBufferLayout,
+    TexelCopyTextureInfo, TextureAspect,
+};
+
+use crate::{
+    camera::ViewCamera,
+    renderer::{Renderer, Target},
+    scene::{FrameScene, Stage},
+};
+
+/// Why there is no picture.
+#[derive(Debug, Error)]
+pub enum OffscreenError {
+    /// No driver that can draw.
+    #[error(
+        "no graphics adapter found ({0}): install a Vulkan driver (on Debian without a GPU: mesa-vulkan-drivers)"
+    )]
+    NoAdapter(String),
+    /// The adapter gave no device.
+    #[error("the graphics adapter {adapter} refused to start: {reason}")]
+    NoDevice {
+        /// Its name.
+        adapter: String,
+        /// What it said.
+        reason: String,
+    },
+    /// The picture is larger than the adapter can draw.
+    #[error("{width_px} × {height_px} px is not a size this adapter can draw: use 1 to {most_px} px a side")]
+    Size {
+        /// Width asked for.
+        width_px: u32,
+        /// Height asked for.
+        height_px: u32,
+        /// The most.
+        most_px: u32,
+    },
+    /// The pixels could not be read back.
+    #[error("the graphics adapter lost the picture: {0}")]
+    ReadBack(String),
+}
+
+/// A graphics device that is bound to no window.
+pub struct Offscreen {
+    /// The device.
+    pub device: Device,
+    /// Its queue.
+    pub queue: Queue,
+    /// The adapter's name.
+    pub adapter: String,
+}
+
+impl Offscreen {
+    /// Opens the first adapter of the machine; a software one will do.
+    pub fn open() -> Result<Self, OffscreenError> {
+        wait(async {
+            let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
+            let adapter = instance
+                .request_adapter(&RequestAdapterOptions::default())
+                .await
+                .map_err(|error| OffscreenError::NoAdapter(error.to_string()))?;
+            let name = adapter.get_info().name;
+            let (device, queue) = adapter
+                .request_device(&DeviceDescriptor {
+                    label: Some("offscreen"),
+                    required_limits: adapter.limits(),
+                    ..Default::default()
+                })
+                .await
+                .map_err(|error| OffscreenError::NoDevice {
+                    adapter: name.clone(),
+                    reason: error.to_string(),
+                })?;
+            Ok(Self { device, queue, adapter: name })
+        })
+    }
+
+    /// A target of the given size.
+    pub fn target(&self, width_px: u32, height_px: u32) -> Result<Target, OffscreenError> {
+        let most_px = self.device.limits().max_texture_dimension_2d;
+        if !(1..=most_px).contains(&width_px) || !(1..=most_px).contains(&height_px) {
+            return Err(OffscreenError::Size { width_px, height_px, most_px });
+        }
+        Ok(Target::new(&self.device, width_px, height_px))
+    }
+
+    /// One picture of a frame on its stage.
+    pub fn picture(
+        &self,
+        stage: &Stage,
+        frame: &FrameScene,
+        camera: &ViewCamera,
+        (width_px, height_px): (u32, u32),
+    ) -> Result<RgbaImage, OffscreenError> {
+        let target = self.target(width_px, height_px)?;
+        let mut renderer = Renderer::new(&self.device, &self.queue, stage);
+        renderer.upload(&self.device, &self.queue, frame);
+        self.draw(&renderer, &target, camera)?;
+        self.read_back(&target)
+    }
+
+    /// Draws into `target` and waits until it is done.
+    pub fn draw(
+        &self,
+        renderer: &Renderer,
+        target: &Target,
+        camera: &ViewCamera,
+    ) -> Result<(), OffscreenError> {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        renderer.draw(&self.queue, &mut encoder, target, camera);
+        self.queue.submit([encoder.finish()]);
+        self.finish()
+    }
+
+    /// Waits for everything submitted.
+    pub fn finish(&self) -> Result<(), OffscreenError> {
+        let polled = self.device.poll(PollType::wait_indefinitely());
+        polled.map(|_| ()).map_err(|error| OffscreenError::ReadBack(error.to_string()))
+    }
+
+    /// The pixels of a target: sRGB, opaque.
+    pub fn read_back(&self, target: &Target) -> Result<RgbaImage, OffscreenError> {
+        let (width, height) = target.size_px();
+        let row_bytes = width * 4;
+        let padded_bytes = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = self.device.create_buffer(&BufferDescriptor {
+            label: Some("pixels"),
+            size: u64::from(padded_bytes) * u64::from(height),
+            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            TexelCopyTextureInfo {
+                texture: &target.texture,
+                mip_level: 0,
+                origin: Origin3d::ZERO,
+                aspect: TextureAspect::All,
+            },
+            TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(padded_bytes),
+                    rows_per_image: None,
+                },
+            },
+            Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+        self.queue.submit([encoder.finish()]);
+        // A failed mapping shows as an error of get_mapped_range below.
+        buffer.slice(..).map_async(MapMode::Read, |_| {});
+        self.finish()?;
+        let mapped = buffer
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|error| OffscreenError::ReadBack(error.to_string()))?;
+        let mut pixels = Vec::with_capacity(row_bytes as usize * height as usize);
+        for row in mapped.chunks_exact(padded_bytes as usize) {
+            pixels.extend_from_slice(&row[..row_bytes as usize]);
+        }
+        RgbaImage::from_raw(width, height, pixels)
+            .ok_or_else(|| OffscreenError::ReadBack("the picture came back with a wrong size".to_owned()))
+    }
+}
+
+/// Runs a future on this thread, which sleeps in between: graphics set-up needs no more of a runtime.
+pub(crate) fn wait<T>(future: impl Future<Output = T>) -> T {
+    struct Unpark(Thread);
+    impl Wake for Unpark {
+        fn wake(self: Arc<Self>) {
+            self.0.unpark();
+        }
+    }
+    let waker = Waker::from(Arc::new(Unpark(thread::current())));
+    let mut context = Context::from_waker(&waker);
+    let mut future = pin!(future);
+    loop {
+        match future.as_mut().poll(&mut context) {
+            Poll::Ready(value) => return value,
+            Poll::Pending => thread::park(),
+        }
+    }
+}

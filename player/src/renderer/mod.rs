@@ -1,0 +1,222 @@
+//! The scene on the GPU: uploads a stage and a frame, and draws them from a camera into a target.
+//!
+//! No threads, files or clock. Deterministic: 4× multisampling, integer noise, no anisotropic filtering, so that a
+//! software adapter gives the same picture to the bit every time.
+
+mod atlas;
+mod buffers;
+mod pipelines;
+mod target;
+
+pub use target::Target;
+
+use bytemuck::{Pod, Zeroable};
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages, Color,
+    CommandEncoder, Device, LoadOp, Operations, PipelineLayoutDescriptor, Queue, RenderPassColorAttachment,
+    RenderPassDepthStencilAttachment, RenderPassDescriptor, ShaderStages, StoreOp, TextureFormat,
+};
+
+use crate::{
+    camera::ViewCamera,
+    scene::{FrameScene, Stage, TURF_THICKNESS_M},
+};
+use atlas::AtlasTexture;
+use buffers::{Growing, Triangles};
+use pipelines::Pipelines;
+
+/// Pictures are linear light in the shaders and sRGB bytes in memory.
+pub const COLOUR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
+/// Samples per pixel.
+pub const SAMPLES: u32 = 4;
+/// Markings that fit the shader's array; a pitch has 27.
+const MOST_MARKINGS: usize = 60;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ViewUniform {
+    clip_from_world: [[f32; 4]; 4],
+    eye_m: [f32; 4],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct StageUniform {
+    half_pitch_m: [f32; 2],
+    half_turf_m: [f32; 2],
+    half_table_m: [f32; 2],
+    turf_corner_m: f32,
+    turf_thickness_m: f32,
+    marking_count: u32,
+    padding: [u32; 3],
+    markings: [[[f32; 4]; 2]; MOST_MARKINGS],
+}
+
+/// Everything on the GPU that a picture of the table needs.
+pub struct Renderer {
+    pipelines: Pipelines,
+    view: Buffer,
+    scene: BindGroup,
+    atlas_layout: BindGroupLayout,
+    atlas: AtlasTexture,
+    ground: Triangles,
+    fixtures: Triangles,
+    nets: Triangles,
+    bodies: Triangles,
+    ball: Triangles,
+    shadows: Growing,
+    shadow_count: u32,
+}
+
+impl Renderer {
+    /// Builds the pipelines and uploads a stage.
+    #[must_use]
+    pub fn new(device: &Device, queue: &Queue, stage: &Stage) -> Self {
+        let uniform = |label, size: usize| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let view = uniform("view", size_of::<ViewUniform>());
+        let sizes = uniform("stage", size_of::<StageUniform>());
+        queue.write_buffer(&sizes, 0, bytemuck::bytes_of(&stage_uniform(stage)));
+
+        let uniform_entry = |binding| BindGroupLayoutEntry {
+            binding,
+            visibility: ShaderStages::VERTEX_FRAGMENT,
+            ty: BindingType::Buffer {
+                ty: BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let scene_layout = device.create_bind_group_layout(&BindGroupLayoutDescriptor {
+            label: Some("scene"),
+            entries: &[uniform_entry(0), uniform_entry(1)],
+        });
+        let scene = device.create_bind_group(&BindGroupDescriptor {
+            label: Some("scene"),
+            layout: &scene_layout,
+            entries: &[
+                BindGroupEntry { binding: 0, resource: view.as_entire_binding() },
+                BindGroupEntry { binding: 1, resource: sizes.as_entire_binding() },
+            ],
+        });
+        let atlas_layout = atlas::layout(device);
+        let layout = |bind_group_layouts| {
+            device.create_pipeline_layout(&PipelineLayoutDescriptor {
+                label: None,
+                bind_group_layouts,
+                ..Default::default()
+            })
+        };
+        let pipelines = Pipelines::new(
+            device,
+            &layout(&[Some(&scene_layout)]),
+            &layout(&[Some(&scene_layout), Some(&atlas_layout)]),
+        );
+
+        let triangles = || Triangles::new(device);
+        let (mut ground, mut fixtures, mut nets) = (triangles(), triangles(), triangles());
+        ground.write(device, queue, &stage.ground.vertices, &stage.ground.indices);
+        fixtures.write(device, queue, &stage.solids.vertices, &stage.solids.indices);
+        nets.write(device, queue, &stage.nets.vertices, &stage.nets.indices);
+        Self {
+            pipelines,
+            view,
+            scene,
+            atlas: AtlasTexture::white(device, queue, &atlas_layout),
+            atlas_layout,
+            ground,
+            fixtures,
+            nets,
+            bodies: triangles(),
+            ball: triangles(),
+            shadows: Growing::new(device, BufferUsages::VERTEX),
+            shadow_count: 0,
+        }
+    }
+
+    /// Uploads the people and the ball of a frame; they stay until the next one.
+    pub fn upload(&mut self, device: &Device, queue: &Queue, frame: &FrameScene) {
+        self.bodies.write(device, queue, &frame.vertices, &frame.indices);
+        match &frame.ball {
+            Some(ball) => self.ball.write(device, queue, &ball.vertices, &ball.indices),
+            None => self.ball.clear(),
+        }
+        self.shadows.write(device, queue, &frame.shadows);
+        self.shadow_count = frame.shadows.len() as u32;
+        self.atlas.upload(device, queue, &self.atlas_layout, frame.atlas.as_ref());
+    }
+
+    /// Draws what was uploaded, seen from `camera`, into `target`.
+    pub fn draw(&self, queue: &Queue, encoder: &mut CommandEncoder, target: &Target, camera: &ViewCamera) {
+        let view = ViewUniform {
+            clip_from_world: camera.clip_from_world().to_cols_array_2d(),
+            eye_m: camera.position_m.as_vec3().extend(1.0).into(),
+        };
+        queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("table"),
+            color_attachments: &[Some(RenderPassColorAttachment {
+                view: &target.samples,
+                depth_slice: None,
+                resolve_target: Some(&target.resolved),
+                ops: Operations { load: LoadOp::Clear(Color::BLACK), store: StoreOp::Discard },
+            })],
+            depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
+                view: &target.depth,
+                // Reversed depth: infinity is 0.
+                depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        pass.set_bind_group(0, &self.scene, &[]);
+        pass.set_pipeline(&self.pipelines.backdrop);
+        pass.draw(0..3, 0..1);
+        pass.set_pipeline(&self.pipelines.ground);
+        self.ground.draw(&mut pass);
+        if self.shadow_count > 0 {
+            pass.set_pipeline(&self.pipelines.shadow);
+            pass.set_vertex_buffer(0, self.shadows.buffer().slice(..));
+            pass.draw(0..4, 0..self.shadow_count);
+        }
+        pass.set_pipeline(&self.pipelines.solid);
+        self.fixtures.draw(&mut pass);
+        self.ball.draw(&mut pass);
+        pass.set_pipeline(&self.pipelines.body);
+        pass.set_bind_group(1, self.atlas.bind_group(), &[]);
+        self.bodies.draw(&mut pass);
+        pass.set_pipeline(&self.pipelines.net);
+        self.nets.draw(&mut pass);
+    }
+}
+
+fn stage_uniform(stage: &Stage) -> StageUniform {
+    let narrow = |pair: [f64; 2]| pair.map(|value| value as f32);
+    let layout = &stage.layout;
+    let mut markings = [[[0.0; 4]; 2]; MOST_MARKINGS];
+    for (slot, marking) in markings.iter_mut().zip(&stage.markings) {
+        *slot = *marking;
+    }
+    StageUniform {
+        half_pitch_m: narrow(layout.half_pitch_m),
+        half_turf_m: narrow(layout.half_turf_m),
+        half_table_m: narrow(layout.half_table_m),
+        turf_corner_m: layout.turf_corner_m as f32,
+        turf_thickness_m: TURF_THICKNESS_M as f32,
+        marking_count: stage.markings.len().min(MOST_MARKINGS) as u32,
+        padding: [0; 3],
+        markings,
+    }
+}

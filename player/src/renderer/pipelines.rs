@@ -1,0 +1,177 @@
+//! The render pipelines: one per kind of thing, all with the same target, depth and samples.
+
+use wgpu::{
+    BlendState, ColorTargetState, ColorWrites, CompareFunction, DepthStencilState, Device, FragmentState,
+    MultisampleState, PipelineLayout, PrimitiveState, PrimitiveTopology, RenderPipeline,
+    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, VertexAttribute, VertexBufferLayout,
+    VertexState, VertexStepMode, vertex_attr_array,
+};
+
+use super::{COLOUR_FORMAT, DEPTH_FORMAT, SAMPLES};
+use crate::scene::{BodyVertex, GroundVertex, NetVertex, Shadow, SolidVertex};
+
+const COMMON: &str = include_str!("shaders/common.wgsl");
+
+/// One pipeline per kind of thing, in drawing order.
+pub(super) struct Pipelines {
+    pub(super) backdrop: RenderPipeline,
+    pub(super) ground: RenderPipeline,
+    pub(super) solid: RenderPipeline,
+    pub(super) shadow: RenderPipeline,
+    pub(super) body: RenderPipeline,
+    pub(super) net: RenderPipeline,
+}
+
+/// How a pipeline treats what is already in the picture.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mixing {
+    /// Behind everything, no depth.
+    Background,
+    /// Hides what is farther.
+    Opaque,
+    /// Tints what is farther, hides nothing.
+    Transparent,
+}
+
+struct Kind<'a> {
+    name: &'a str,
+    shader: &'a str,
+    mixing: Mixing,
+    topology: PrimitiveTopology,
+    step_mode: VertexStepMode,
+    stride: usize,
+    attributes: &'a [VertexAttribute],
+}
+
+impl Pipelines {
+    /// `plain` binds the view, `textured` also an atlas.
+    pub(super) fn new(device: &Device, plain: &PipelineLayout, textured: &PipelineLayout) -> Self {
+        let triangles = |name, shader, mixing, stride, attributes| Kind {
+            name,
+            shader,
+            mixing,
+            topology: PrimitiveTopology::TriangleList,
+            step_mode: VertexStepMode::Vertex,
+            stride,
+            attributes,
+        };
+        let ground_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32];
+        let solid_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3];
+        let shadow_attributes = vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Float32];
+        let body_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x2, 2 => Unorm8x4];
+        let net_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x2];
+        Self {
+            backdrop: build(
+                device,
+                plain,
+                &triangles("backdrop", include_str!("shaders/backdrop.wgsl"), Mixing::Background, 0, &[]),
+            ),
+            ground: build(
+                device,
+                plain,
+                &triangles(
+                    "ground",
+                    include_str!("shaders/ground.wgsl"),
+                    Mixing::Opaque,
+                    size_of::<GroundVertex>(),
+                    &ground_attributes,
+                ),
+            ),
+            solid: build(
+                device,
+                plain,
+                &triangles(
+                    "solid",
+                    include_str!("shaders/solid.wgsl"),
+                    Mixing::Opaque,
+                    size_of::<SolidVertex>(),
+                    &solid_attributes,
+                ),
+            ),
+            shadow: build(
+                device,
+                plain,
+                &Kind {
+                    name: "shadow",
+                    shader: include_str!("shaders/shadow.wgsl"),
+                    mixing: Mixing::Transparent,
+                    topology: PrimitiveTopology::TriangleStrip,
+                    step_mode: VertexStepMode::Instance,
+                    stride: size_of::<Shadow>(),
+                    attributes: &shadow_attributes,
+                },
+            ),
+            body: build(
+                device,
+                textured,
+                &triangles(
+                    "body",
+                    include_str!("shaders/body.wgsl"),
+                    Mixing::Opaque,
+                    size_of::<BodyVertex>(),
+                    &body_attributes,
+                ),
+            ),
+            net: build(
+                device,
+                plain,
+                &triangles(
+                    "net",
+                    include_str!("shaders/net.wgsl"),
+                    Mixing::Transparent,
+                    size_of::<NetVertex>(),
+                    &net_attributes,
+                ),
+            ),
+        }
+    }
+}
+
+fn build(device: &Device, layout: &PipelineLayout, kind: &Kind<'_>) -> RenderPipeline {
+    let module = device.create_shader_module(ShaderModuleDescriptor {
+        label: Some(kind.name),
+        source: ShaderSource::Wgsl(format!("{COMMON}\n{}", kind.shader).into()),
+    });
+    let buffer = VertexBufferLayout {
+        array_stride: kind.stride as u64,
+        step_mode: kind.step_mode,
+        attributes: kind.attributes,
+    };
+    let buffers = [Some(buffer)];
+    device.create_render_pipeline(&RenderPipelineDescriptor {
+        label: Some(kind.name),
+        layout: Some(layout),
+        vertex: VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: if kind.stride == 0 { &[] } else { &buffers },
+        },
+        // Reconstructed people are open surfaces: both sides are drawn.
+        primitive: PrimitiveState { topology: kind.topology, cull_mode: None, ..Default::default() },
+        depth_stencil: Some(DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(kind.mixing == Mixing::Opaque),
+            // Reversed depth: nearer is larger.
+            depth_compare: Some(match kind.mixing {
+                Mixing::Background => CompareFunction::Always,
+                Mixing::Opaque | Mixing::Transparent => CompareFunction::GreaterEqual,
+            }),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: MultisampleState { count: SAMPLES, ..Default::default() },
+        fragment: Some(FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(ColorTargetState {
+                format: COLOUR_FORMAT,
+                blend: (kind.mixing == Mixing::Transparent).then_some(BlendState::ALPHA_BLENDING),
+                write_mask: ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
