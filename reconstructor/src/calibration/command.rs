@@ -1,0 +1,176 @@
+//! `reconstructor calibrate`: the cameras of a clip or of pictures, written as JSON, with overlays for checking by eye.
+
+use std::{
+    io::Write,
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use image::{ImageReader, Limits, RgbImage};
+use protocol::pitch::Pitch;
+use serde::Serialize;
+
+use super::{
+    Calibration, CalibrationError, CameraEstimate, calibrate, calibrate_pictures, overlay, sequence::median,
+    soccernet::SoccerNetCamera,
+};
+use crate::{
+    ingest::{Clip, MAX_SIDE_PX},
+    report::Progress,
+};
+
+/// Bytes that decoding one picture may take.
+const PICTURE_BYTES: u64 = 1 << 30;
+
+/// What `reconstructor calibrate` was asked for.
+#[derive(Clone, Debug)]
+pub struct CalibrateOptions {
+    /// One clip, or one or more pictures of one shot in order.
+    pub inputs: Vec<PathBuf>,
+    /// The correspondences of one frame.
+    pub calibration: PathBuf,
+    /// Frames of the clip; all when `None`.
+    pub frames: Option<Range<u32>>,
+    /// Where the cameras go.
+    pub out: PathBuf,
+    /// Folder for pictures with the lines drawn in, when wanted.
+    pub overlay: Option<PathBuf>,
+}
+
+/// The file that `reconstructor calibrate` writes.
+#[derive(Clone, Debug, Serialize)]
+pub struct CalibrationReport {
+    /// Size of the pitch the cameras were fitted to.
+    pub pitch: Pitch,
+    /// Frames with a camera.
+    pub solved: usize,
+    /// Median over the frames of their median line distance, pixels.
+    pub line_residual_median_px: f64,
+    /// Greatest of the frames' median line distances, pixels.
+    pub line_residual_worst_px: f64,
+    /// One entry per frame.
+    pub frames: Vec<FrameCamera>,
+}
+
+/// One frame of that file.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameCamera {
+    /// Index in the whole clip, or of the picture in the list.
+    pub clip_frame: u32,
+    /// The camera and how well it fits.
+    #[serde(flatten)]
+    pub estimate: CameraEstimate,
+    /// The same camera in SoccerNet's terms.
+    pub soccernet: Option<SoccerNetCamera>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When an input cannot be read, the correspondences cannot be used, or a result cannot be written.
+pub fn run(options: &CalibrateOptions, progress: &Progress) -> Result<CalibrationReport, CalibrationError> {
+    let given = Calibration::read(&options.calibration)?;
+    let (frames, estimates) = match options.inputs.as_slice() {
+        [] => return Err(CalibrationError::NoFrames),
+        [clip] if !is_picture(clip) => {
+            let clip = Clip::open(clip, options.frames.clone())?;
+            let estimates = calibrate(&clip, &[], &given, progress)?;
+            if let Some(folder) = &options.overlay {
+                let pictures = clip.frames()?.map(|frame| Ok(frame?.image));
+                write_overlays(
+                    folder,
+                    pictures,
+                    clip.info().frames.iter().map(|f| f.clip_frame),
+                    &estimates,
+                    &given.pitch,
+                )?;
+            }
+            (clip.info().frames.iter().map(|frame| frame.clip_frame).collect::<Vec<u32>>(), estimates)
+        }
+        paths => {
+            let pictures = read_pictures(paths)?;
+            let estimates = calibrate_pictures(pictures.clone(), &given)?;
+            if let Some(folder) = &options.overlay {
+                write_overlays(folder, pictures.into_iter().map(Ok), 0.., &estimates, &given.pitch)?;
+            }
+            ((0..).take(paths.len()).collect(), estimates)
+        }
+    };
+    let residuals: Vec<f64> = estimates.iter().filter_map(|e| e.line_residual_median_px).collect();
+    let report = CalibrationReport {
+        pitch: given.pitch,
+        solved: estimates.iter().filter(|e| e.camera.is_some()).count(),
+        line_residual_worst_px: residuals.iter().copied().fold(0.0, f64::max),
+        line_residual_median_px: median(residuals),
+        frames: frames
+            .into_iter()
+            .zip(estimates)
+            .map(|(clip_frame, estimate)| FrameCamera {
+                clip_frame,
+                soccernet: estimate.camera.as_ref().map(SoccerNetCamera::from),
+                estimate,
+            })
+            .collect(),
+    };
+    write_report(&options.out, &report)?;
+    Ok(report)
+}
+
+fn is_picture(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    matches!(extension.as_str(), "png" | "jpg" | "jpeg")
+}
+
+fn read_pictures(paths: &[PathBuf]) -> Result<Vec<RgbImage>, CalibrationError> {
+    let mut pictures: Vec<RgbImage> = Vec::new();
+    for path in paths {
+        let broken = |source: image::ImageError| CalibrationError::Picture { path: path.clone(), source };
+        let mut reader = ImageReader::open(path).map_err(|e| broken(e.into()))?;
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(MAX_SIDE_PX);
+        limits.max_image_height = Some(MAX_SIDE_PX);
+        limits.max_alloc = Some(PICTURE_BYTES);
+        reader.limits(limits);
+        let picture = reader.decode().map_err(broken)?.into_rgb8();
+        let (width, height) = picture.dimensions();
+        if let Some((first_width, first_height)) = pictures.first().map(RgbImage::dimensions)
+            && (width, height) != (first_width, first_height)
+        {
+            let path = path.clone();
+            return Err(CalibrationError::PictureSize { path, width, height, first_width, first_height });
+        }
+        pictures.push(picture);
+    }
+    Ok(pictures)
+}
+
+fn write_overlays(
+    folder: &Path,
+    pictures: impl Iterator<Item = Result<RgbImage, CalibrationError>>,
+    numbers: impl Iterator<Item = u32>,
+    estimates: &[CameraEstimate],
+    pitch: &Pitch,
+) -> Result<(), CalibrationError> {
+    let failed = |path: &Path, reason: String| CalibrationError::Write { path: path.into(), reason };
+    std::fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
+    for ((picture, number), estimate) in pictures.zip(numbers).zip(estimates) {
+        let mut picture = picture?;
+        if let Some(camera) = &estimate.camera {
+            overlay::draw(&mut picture, camera, pitch);
+        }
+        let path = folder.join(format!("{number:06}.png"));
+        picture.save(&path).map_err(|e| failed(&path, e.to_string()))?;
+    }
+    Ok(())
+}
+
+/// Writes beside the target first, so that a full disk leaves no half file.
+fn write_report(path: &Path, report: &CalibrationReport) -> Result<(), CalibrationError> {
+    let failed = |reason: String| CalibrationError::Write { path: path.into(), reason };
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let text = serde_json::to_vec_pretty(report).map_err(|e| failed(e.to_string()))?;
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| failed(e.to_string()))?;
+    file.write_all(&text).map_err(|e| failed(e.to_string()))?;
+    file.persist(path).map_err(|e| failed(e.to_string()))?;
+    Ok(())
+}

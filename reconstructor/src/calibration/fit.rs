@@ -1,0 +1,132 @@
+//! The energy of section 4.1 for one frame, and its minimum near an expected camera.
+//!
+//! Three changes to the paper's sum of squared distances: distances are robust (Geman–McClure, from coarse to fine), so that a
+//! line nobody painted pulls no more than a bounded amount; the set of points is fixed before the search and a point that
+//! leaves the picture costs as much as one without any line near it, so that losing points never pays; and the camera is
+//! expected near where its motion takes it, which decides what a frame with few lines leaves open.
+
+use glam::DVec2;
+use protocol::camera::Camera;
+
+use super::{
+    least_squares::{
+        LOG_FOCAL, Normal, PARAMETERS, POSITION, RADIAL, ROTATION, Row, minimise, project_with_derivatives,
+        turn_between,
+    },
+    lines::LineMap,
+    template::{Sample, visible},
+};
+use crate::geometry::PixelBox;
+
+/// Distances at which a point counts half, one after the other, at 720 rows.
+const SCALES_PX: [f64; 3] = [12.0, 5.0, 2.5];
+/// Error of a line's middle, pixels, and how many neighbouring points share one error.
+const LINE_SIGMA_PX: f64 = 1.0;
+const POINTS_PER_ERROR: f64 = 6.0;
+/// A nearest line pixel that is farther than this along the line is the end of another line, at 720 rows.
+const MOST_ALONG_PX: f64 = 6.0;
+
+/// Where a camera is expected before the lines are looked at: standard deviations of its parameters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expectation {
+    /// The camera expected.
+    pub(super) camera: Camera,
+    /// Standard deviation of each parameter about it; `f64::INFINITY` when nothing is known, 0 when it must not move.
+    pub(super) sigma: Row,
+}
+
+/// What one point of the lines has to say.
+pub(super) struct Pull {
+    /// Derivatives of the signed distance across the line.
+    pub(super) row: Row,
+    /// Signed distance across the line, pixels.
+    pub(super) residual: f64,
+    /// Weight of the residual in the normal equations.
+    pub(super) weight: f64,
+    /// Robust cost, in the same unit.
+    pub(super) cost: f64,
+}
+
+/// The camera of a frame near an expected one.
+pub(super) fn fit(
+    expected: &Expectation,
+    samples: &[Sample],
+    people: &[PixelBox],
+    map: &LineMap<'_>,
+) -> Camera {
+    let shown = visible(&expected.camera, samples, people);
+    let free = expected.sigma.map(|sigma| sigma > 0.0);
+    let picture_scale = f64::from(expected.camera.height_px) / 720.0;
+    SCALES_PX.iter().fold(expected.camera, |camera, scale| {
+        minimise(camera, free, 12, |candidate| {
+            energy(candidate, expected, &shown, map, scale * picture_scale)
+        })
+        .0
+    })
+}
+
+fn energy(
+    camera: &Camera,
+    expected: &Expectation,
+    shown: &[Sample],
+    map: &LineMap<'_>,
+    scale_px: f64,
+) -> Normal {
+    let mut normal = Normal::new();
+    for sample in shown {
+        match pull(camera, sample, map, scale_px) {
+            Some(pull) => normal.add(&pull.row, pull.residual, pull.weight, pull.cost),
+            None => normal.cost += no_match_cost(scale_px),
+        }
+    }
+    let turn = turn_between(&expected.camera.rotation, &camera.rotation);
+    let travel = camera.position - expected.camera.position;
+    let mut difference = [0.0; PARAMETERS];
+    difference[LOG_FOCAL] = (camera.focal_px / expected.camera.focal_px).ln();
+    difference[ROTATION..ROTATION + 3].copy_from_slice(&turn.to_array());
+    difference[POSITION..POSITION + 3].copy_from_slice(&travel.to_array());
+    difference[RADIAL] = camera.k1 - expected.camera.k1;
+    for parameter in 0..PARAMETERS {
+        let sigma = expected.sigma[parameter];
+        if sigma > 0.0 && sigma.is_finite() {
+            normal.expect(parameter, difference[parameter], sigma);
+        }
+    }
+    normal
+}
+
+/// What a point without any line near it costs.
+pub(super) fn no_match_cost(scale_px: f64) -> f64 {
+    scale_px * scale_px / (LINE_SIGMA_PX * LINE_SIGMA_PX * POINTS_PER_ERROR)
+}
+
+/// How a point of the lines pulls at a camera; `None` when it is out of the picture or no line is near.
+pub(super) fn pull(camera: &Camera, sample: &Sample, map: &LineMap<'_>, scale_px: f64) -> Option<Pull> {
+    let (pixel, rows) = project_with_derivatives(camera, sample.point)?;
+    let normal = sample.normal(camera, pixel)?;
+    let offset = pixel - map.nearest(pixel, normal)?;
+    let along = MOST_ALONG_PX * f64::from(camera.height_px) / 720.0;
+    if offset.dot(normal.perp()).abs() > along {
+        return None;
+    }
+    let residual = offset.dot(normal);
+    let row = std::array::from_fn(|i| normal.x * rows[0][i] + normal.y * rows[1][i]);
+    let (squared, scale) = (residual * residual, scale_px * scale_px);
+    let unit = 1.0 / (LINE_SIGMA_PX * LINE_SIGMA_PX * POINTS_PER_ERROR);
+    let bounded = scale / (scale + squared);
+    Some(Pull { row, residual, weight: unit * bounded * bounded, cost: unit * squared * bounded })
+}
+
+/// Median distance in pixels from the visible line points to the nearest line pixel, and the number of points.
+pub(super) fn residual(
+    camera: &Camera,
+    samples: &[Sample],
+    people: &[PixelBox],
+    map: &LineMap<'_>,
+) -> (Option<f64>, usize) {
+    let shown = visible(camera, samples, people);
+    let pixels = shown.iter().filter_map(|sample| camera.project(sample.point));
+    let mut distances: Vec<f64> = pixels.map(|pixel: DVec2| map.distance_px(pixel)).collect();
+    distances.sort_by(f64::total_cmp);
+    (distances.get(distances.len() / 2).copied(), distances.len())
+}
