@@ -3,6 +3,8 @@
 //! Reading checks everything that a reader relies on later: counts, paths that stay inside the stream, order of time.
 
 mod check;
+#[cfg(test)]
+mod tests;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -57,11 +57,33 @@ impl Timescale {
         let ticks = scaled / (u128::from(self.denominator) * 1_000_000_000);
         Ticks(i64::try_from(ticks).unwrap_or(i64::MAX))
     }
+
+    /// The first nanosecond of `ticks`, so that [`Timescale::ticks_in_nanoseconds`] gives `ticks` back as long as a tick is
+    /// at least a nanosecond; 0 before the start.
+    #[must_use]
+    pub fn nanoseconds(self, ticks: Ticks) -> u64 {
+        let ticks = u128::try_from(ticks.0).unwrap_or(0);
+        let scaled = ticks * u128::from(self.denominator) * 1_000_000_000;
+        u64::try_from(scaled.div_ceil(u128::from(self.numerator.max(1)))).unwrap_or(u64::MAX)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn nanoseconds_and_back(ticks in 0..1_000_000_000i64, numerator in 1..1_000_000u32, denominator in 1..1002u32) {
+            let timescale = Timescale { numerator, denominator };
+            let there = timescale.nanoseconds(Ticks(ticks));
+            prop_assume!(there < u64::MAX);
+            prop_assert_eq!(timescale.ticks_in_nanoseconds(there), Ticks(ticks));
+            prop_assert!(there == 0 || timescale.ticks_in_nanoseconds(there - 1) < Ticks(ticks));
+        }
+    }
 
     #[test]
     fn a_frame_at_ntsc_rate_is_1001_of_30000() {

@@ -329,3 +329,98 @@ proptest! {
         assert_close(&chunk, &back);
     }
 }
+
+/// Splitmix64: enough randomness for mutations, the same every run.
+fn random(state: &mut u64) -> u64 {
+    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+/// Most memory that this process has ever used, bytes; `None` where the system does not say.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+#[test]
+fn thousands_of_mutations_end_in_an_error_or_a_chunk_within_the_limits() {
+    let chunk = Chunk { frames: vec![sample::frame_of(3, 2), sample::frame_of(4, 2)] };
+    let good = encode(&chunk, sample::TIMESCALE).unwrap();
+    let json_end = 20 + Glb::parse(&good).unwrap().json.len();
+    let limits = Limits { decoded_bytes_per_chunk: 32 << 20, ..Limits::default() };
+    let before = peak_bytes();
+    let (mut state, mut refused, mut accepted) = (1, 0, 0);
+    for round in 0..20_000 {
+        let mut bytes = good.clone();
+        for _ in 0..=random(&mut state) % 6 {
+            // Document and binary part in turn; the container has its own tests.
+            let (from, to) = if round % 2 == 0 { (20, json_end) } else { (json_end + 8, bytes.len()) };
+            let at = from + random(&mut state) as usize % (to - from);
+            bytes[at] = match random(&mut state) % 4 {
+                0 => bytes[at] ^ (1 << (random(&mut state) % 8)),
+                1 => b'0' + (random(&mut state) % 10) as u8,
+                2 => [0, 0xFF, 0x7F, 0x80][random(&mut state) as usize % 4],
+                _ => random(&mut state) as u8,
+            };
+        }
+        if round % 10 == 0 {
+            // Cut, with a header that agrees.
+            bytes.truncate(json_end + 8 + random(&mut state) as usize % (good.len() - json_end - 8));
+            let (total, bin) = (bytes.len() as u32, (bytes.len() - json_end - 8) as u32);
+            bytes[8..12].copy_from_slice(&total.to_le_bytes());
+            bytes[json_end..json_end + 4].copy_from_slice(&bin.to_le_bytes());
+        }
+        match decode(&bytes, &limits) {
+            Err(_) => refused += 1,
+            Ok(chunk) => {
+                accepted += 1;
+                for body in chunk.frames.iter().flat_map(|frame| &frame.bodies) {
+                    assert!(body.mesh.positions_m.len() <= limits.vertices_per_body);
+                    assert_eq!(body.mesh.positions_m.len(), body.mesh.uvs.len());
+                    assert!(body.anchor_m.is_finite());
+                }
+            }
+        }
+    }
+    println!("{refused} refused, {accepted} accepted");
+    assert!(refused > 5_000 && accepted > 500, "{refused} refused, {accepted} accepted: the mutations miss");
+    if let (Some(before), Some(after)) = (before, peak_bytes()) {
+        assert!(after - before < 256 << 20, "memory grew by {} MiB", (after - before) >> 20);
+    }
+}
+
+#[test]
+fn a_small_file_cannot_ask_for_much() {
+    // One mesh named by every body of every frame: the budget ends it.
+    let bytes = encode(&sample::chunk_of(0, 1, 1), sample::TIMESCALE).unwrap();
+    let many = with_json(&bytes, |document| {
+        let index = &mut document["scenes"][0]["extras"]["holopitch"];
+        index["frames"][0]["bodies"] = (0..100).map(|person| serde_json::json!([person, 0])).collect();
+        index["people"] = (0..100).map(|person| serde_json::json!({ "id": person, "anchors": 5 })).collect();
+        let frame = index["frames"][0].clone();
+        index["frames"] = (0..300i64)
+            .map(|position| {
+                let mut frame = frame.clone();
+                frame["start"] = (position * 1001).into();
+                frame
+            })
+            .collect();
+    });
+    let limits = Limits { decoded_bytes_per_chunk: 1 << 20, ..Limits::default() };
+    assert!(decode(&many, &limits).is_err());
+
+    // Accessors that promise as much as the limits allow, over Draco data that has far less.
+    let boastful = with_json(&bytes, |document| {
+        for accessor in document["accessors"].as_array_mut().unwrap() {
+            if accessor["bufferView"].is_null() {
+                accessor["count"] = if accessor["type"] == "SCALAR" { 150_000 } else { 50_000 }.into();
+            }
+        }
+    });
+    let error = decode(&boastful, &Limits::default()).unwrap_err().to_string();
+    assert!(error.contains("person 0"), "{error}");
+}
