@@ -17,8 +17,9 @@ const SIDE: usize = 256;
 const LANDMARKS: usize = 39;
 /// Numbers per landmark: x, y, z in pixels of the square, visibility and presence as logits.
 const LANDMARK_VALUES: usize = 5;
-/// The square is this much larger than the longer side of the box.
-const MARGIN: f64 = 1.25;
+/// The square is this much larger than the longer side of the box. On players of 35 to 85 px the network's own score is
+/// best at 1.4 to 1.6, and legs that reach out of a detector's tight box are read better than at the usual 1.25.
+const MARGIN: f64 = 1.5;
 const LEFT_HIP: usize = 23;
 const RIGHT_HIP: usize = 24;
 
@@ -50,6 +51,19 @@ pub(super) struct Estimate {
     pub(super) score: f32,
     /// On the whole pixels of the clip inside the square and the picture.
     pub(super) mask: Mask,
+}
+
+impl Estimate {
+    /// The pixel between the hips.
+    pub(super) fn hips_px(&self) -> Option<DVec2> {
+        Some((self.joints.get(LEFT_HIP)?.pixel + self.joints.get(RIGHT_HIP)?.pixel) / 2.0)
+    }
+
+    /// Whether the hips lie well inside the detector's box, so that this is the person that the box was drawn round.
+    pub(super) fn is_of(&self, bounds: &PixelBox) -> bool {
+        let reach = bounds.size() * DVec2::new(0.35, 0.4);
+        self.hips_px().is_some_and(|hips| (hips - bounds.centre()).abs().cmple(reach).all())
+    }
 }
 
 /// Runs the network on a square of `picture`.
@@ -177,11 +191,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_square_is_a_quarter_larger_than_the_box() {
+    fn the_square_is_half_as_large_again_as_the_box() {
         let square = Square::round(&PixelBox { min: DVec2::new(10.0, 20.0), max: DVec2::new(30.0, 100.0) });
-        assert_eq!(square, Square { centre: DVec2::new(20.0, 60.0), side: 100.0 });
+        assert_eq!(square, Square { centre: DVec2::new(20.0, 60.0), side: 120.0 });
         assert_eq!(square.to_clip(128.0, 128.0), square.centre);
-        assert_eq!(square.to_clip(0.0, 256.0), DVec2::new(-30.0, 110.0));
+        assert_eq!(square.to_clip(0.0, 256.0), DVec2::new(-40.0, 120.0));
     }
 
     #[test]

@@ -16,8 +16,10 @@ const FOOT_JOINTS: [[(usize, f64); 3]; 2] = [
     [(index::LEFT_ANKLE, 0.08), (index::LEFT_HEEL, 0.03), (index::LEFT_TOE, 0.02)],
     [(index::RIGHT_ANKLE, 0.08), (index::RIGHT_HEEL, 0.03), (index::RIGHT_TOE, 0.02)],
 ];
-/// The network's depths are noisy: this share of the depth between foot and hips is believed.
+/// The network's depths are noisy: between foot and hips, this share of what they differ from an upright leg is believed.
 const DEPTH_TRUST: f64 = 0.5;
+/// Hips above the feet of somebody upright, metres.
+const HIP_M: f64 = 0.9;
 /// A foot whose line of sight meets the pitch this much farther than the other's is in the air, metres.
 const BOTH_STAND_M: f64 = 0.5;
 /// Top of the head above the pitch that a player can have: lying or tackling to jumping.
@@ -76,12 +78,15 @@ pub(super) fn stand(camera: &Camera, pitch: &Pitch, joints: &[Joint]) -> Option<
 
 /// How far away along the optical axis the hips are if this foot stands, with the weight of the joints it rests on.
 fn hip_depth_from_foot(camera: &Camera, joints: &[Joint], foot: &[(usize, f64)]) -> Option<(f64, f64)> {
+    // Seen from above, the feet of an upright body are farther along the optical axis than its hips.
+    let upright = -HIP_M * camera.forward().y;
     let (mut sum, mut weights) = (0.0, 0.0);
     for &(joint, height_m) in foot {
         let joint = joints.get(joint)?;
         let Some(point) = camera.ray(joint.pixel).at_height(height_m) else { continue };
         let weight = f64::from(joint.visibility).max(0.05);
-        sum += weight * (camera.depth(point) - DEPTH_TRUST * f64::from(joint.depth_m));
+        let from_hips = upright + DEPTH_TRUST * (f64::from(joint.depth_m) - upright);
+        sum += weight * (camera.depth(point) - from_hips);
         weights += weight;
     }
     (weights > 0.0).then(|| (sum / weights, weights))

@@ -71,8 +71,21 @@ const CANDIDATES_MAX: usize = 80;
 const POSE_SCORE_MIN: f32 = 0.3;
 /// A mask below this share of the body's box is none.
 const MASK_SHARE_MIN: f64 = 0.08;
-/// A box whose middle part is inside a person's own mask up to this share was that person again.
-const SAME_MASK: f64 = 0.5;
+/// Below this score, or with the hips more than this part of the square from its middle, a second look is taken from
+/// there.
+const SURE: f32 = 0.7;
+const OFF_CENTRE: f64 = 0.06;
+/// The square of a second look at somebody in a tangle, relative to the first.
+const NARROW: f64 = 0.8;
+/// Sides of further squares, relative to the first, for a clear detection whose pose stays below this score: on hard
+/// poses the network's verdict changes with small changes of the square.
+const OTHER_LOOKS: [f64; 3] = [0.85, 1.25, 1.6];
+const UNSURE: f32 = 0.5;
+const CLEAR_DETECTION: f32 = 0.35;
+/// Masks that share this part of the smaller one are of the same person if one of them is much shorter: half a body
+/// found again. Two people in a tangle are about the same height.
+const SAME_MASK: f64 = 0.7;
+const HALF_BODY: f64 = 0.7;
 /// Skeletons nearer than this, on average over the trunk and legs, are the same person, metres.
 const SAME_SKELETON_M: f64 = 0.25;
 
@@ -171,8 +184,57 @@ impl PoseEstimator {
         if picture.is_empty() || !(square.side >= 1.0) || !square.centre.is_finite() {
             return Ok(None);
         }
-        let seen = blazepose::estimate(&mut self.model, picture, square)?;
-        Ok(person_from(seen, detection, camera, pitch))
+        let seen = self.look(picture, square, detection)?;
+        let person = person_from(seen, detection, camera, pitch);
+        if person.is_none() {
+            tracing::trace!(
+                x = square.centre.x,
+                y = square.centre.y,
+                score = detection.score,
+                "nobody on the pitch"
+            );
+        }
+        Ok(person)
+    }
+
+    /// The best of several looks: most people need one, some a second from their hips, a few wider or narrower ones.
+    fn look(
+        &mut self,
+        picture: &RgbImage,
+        square: blazepose::Square,
+        detection: &Detection,
+    ) -> Result<blazepose::Estimate, PoseError> {
+        let bounds = &detection.bounds;
+        let mut best = blazepose::estimate(&mut self.model, picture, square)?;
+        if !best.is_of(bounds) {
+            // A wide square in a tangle shows the neighbour as well, and the network may prefer that one.
+            let narrow = blazepose::Square { side: square.side * NARROW, ..square };
+            let narrow = blazepose::estimate(&mut self.model, picture, narrow)?;
+            if narrow.is_of(bounds) {
+                best = narrow;
+            }
+        } else if let Some(hips) = best.hips_px() {
+            let shift = hips.distance(square.centre) / square.side;
+            if shift > OFF_CENTRE || best.score < SURE {
+                let second = blazepose::Square { centre: hips, ..square };
+                let second = blazepose::estimate(&mut self.model, picture, second)?;
+                // What is in the middle is read better than the score says.
+                if second.is_of(bounds) && second.score > best.score - 0.1 {
+                    best = second;
+                }
+            }
+        }
+        for scale in OTHER_LOOKS {
+            if best.score >= UNSURE || detection.score < CLEAR_DETECTION {
+                break;
+            }
+            let other = blazepose::Square { side: square.side * scale, ..square };
+            let other = blazepose::estimate(&mut self.model, picture, other)?;
+            if other.is_of(bounds) && other.score > best.score {
+                best = other;
+            }
+        }
+        Ok(best)
     }
 }
 
@@ -207,6 +269,11 @@ fn person_from(
     })
 }
 
+/// Which of two looks at one person to keep: the surer one that shows more of the body.
+fn weight(person: &Person) -> f64 {
+    f64::from(person.pose_score * person.score) * person.bounds.size().y
+}
+
 /// Whether two skeletons, or two masks, are those of one person.
 fn same_person(a: &Person, b: &Person, camera: &Camera) -> bool {
     let compared = [
@@ -228,11 +295,13 @@ fn same_person(a: &Person, b: &Person, camera: &Camera) -> bool {
     // The network sometimes swaps left and right between two looks at one person: then only the middles coincide.
     let middles_px = (middle(a) - middle(b)).length() / count;
     let near_px = SAME_SKELETON_M * camera.pixels_per_metre(a.ground_m);
-    apart_px < near_px || middles_px < 0.5 * near_px || mask_iou(&a.mask, &b.mask) > SAME_MASK
+    let (height_a, height_b) = (a.bounds.size().y, b.bounds.size().y);
+    let half = height_a.min(height_b) < HALF_BODY * height_a.max(height_b);
+    apart_px < near_px || middles_px < 0.5 * near_px || (half && mask_overlap(&a.mask, &b.mask) > SAME_MASK)
 }
 
-/// Intersection over union of the pixels inside two masks, 0..1.
-fn mask_iou(a: &Mask, b: &Mask) -> f64 {
+/// Pixels inside both masks as a share of the smaller mask, 0..1.
+fn mask_overlap(a: &Mask, b: &Mask) -> f64 {
     let (area_a, area_b) = (a.area_px(), b.area_px());
     let width = a.width.max(1) as usize;
     let shared = a
@@ -244,8 +313,8 @@ fn mask_iou(a: &Mask, b: &Mask) -> f64 {
             **c >= silhouette::INSIDE && b.at(x, y) >= silhouette::INSIDE
         })
         .count();
-    let union = area_a + area_b - shared;
-    if union == 0 { 0.0 } else { shared as f64 / union as f64 }
+    let smaller = area_a.min(area_b);
+    if smaller == 0 { 0.0 } else { shared as f64 / smaller as f64 }
 }
 
 #[cfg(test)]
@@ -272,8 +341,8 @@ mod tests {
 
     #[test]
     fn masks_overlap_by_their_pixels() {
-        assert!((mask_iou(&person(100.0, 0.0).mask, &person(100.0, 0.0).mask) - 1.0).abs() < 1e-12);
-        assert!((mask_iou(&person(100.0, 0.0).mask, &person(108.0, 0.0).mask) - 1.0 / 3.0).abs() < 1e-12);
-        assert!(mask_iou(&Mask::default(), &person(108.0, 0.0).mask).abs() < 1e-12);
+        assert!((mask_overlap(&person(100.0, 0.0).mask, &person(100.0, 0.0).mask) - 1.0).abs() < 1e-12);
+        assert!((mask_overlap(&person(100.0, 0.0).mask, &person(108.0, 0.0).mask) - 0.5).abs() < 1e-12);
+        assert!(mask_overlap(&Mask::default(), &person(108.0, 0.0).mask).abs() < 1e-12);
     }
 }
