@@ -61,7 +61,7 @@ impl Estimate {
 
     /// Whether the hips lie well inside the detector's box, so that this is the person that the box was drawn round.
     pub(super) fn is_of(&self, bounds: &PixelBox) -> bool {
-        let reach = bounds.size() * DVec2::new(0.35, 0.4);
+        let reach = bounds.size() * DVec2::new(0.25, 0.4);
         self.hips_px().is_some_and(|hips| (hips - bounds.centre()).abs().cmple(reach).all())
     }
 }
