@@ -1,5 +1,8 @@
 //! Every figure that Holopitch states about itself is computed here, by the definitions of the design's section on
 //! measures; one module per measure.
 
+pub mod depth;
 pub mod matches;
+pub mod npy;
+pub mod planes;
 mod surface;

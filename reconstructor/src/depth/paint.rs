@@ -1,0 +1,174 @@
+//! The pose as the network sees it: every limb painted over the window as a capsule with its depth.
+//!
+//! The skeleton of the pose network tells front from back, which a small picture hardly does. `training/window.py` paints
+//! the same; a test of this folder compares the two.
+
+use glam::{DVec2, DVec3};
+use protocol::camera::Camera;
+
+use super::window::{GRID, Window};
+use crate::pose::{JOINTS, Joint};
+
+/// Metres that are 1.0 in the painted channels.
+const DEPTH_SCALE_M: f64 = 0.5;
+/// Painted depths stay within ± this (in units of [`DEPTH_SCALE_M`]), whatever the pose network said.
+const DEPTH_CLIP: f64 = 3.0;
+/// Width of the ramp of presence beside a limb, metres.
+const EDGE_M: f64 = 0.1;
+/// Channels of the painted pose.
+pub(super) const POSE_CHANNELS: usize = 3;
+
+/// Middle of the shoulders and of the hips, numbered after the pose network's joints.
+const NECK: usize = JOINTS;
+const PELVIS: usize = JOINTS + 1;
+
+/// Limbs: joint, joint, radius in metres of a man in kit.
+const LIMBS: [(usize, usize, f64); 18] = [
+    (0, NECK, 0.10),
+    (11, 12, 0.09),
+    (23, 24, 0.11),
+    (11, 23, 0.10),
+    (12, 24, 0.10),
+    (NECK, PELVIS, 0.12),
+    (11, 13, 0.05),
+    (13, 15, 0.05),
+    (12, 14, 0.05),
+    (14, 16, 0.05),
+    (23, 25, 0.08),
+    (24, 26, 0.08),
+    (25, 27, 0.06),
+    (26, 28, 0.06),
+    (27, 29, 0.05),
+    (28, 30, 0.05),
+    (29, 31, 0.05),
+    (30, 32, 0.05),
+];
+
+/// How the camera sees a player: what turns pixels of the clip into metres at the player.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Pixels of the clip that one metre across the line of sight takes up at the player.
+    pub pixels_per_metre: f64,
+    /// Tangent of the angle at which the camera looks down on the player's anchor.
+    pub descent: f64,
+}
+
+impl View {
+    /// How `camera` sees somebody who stands at `ground_m` (world metres); `None` behind the camera or straight below it.
+    #[must_use]
+    pub fn from_camera(camera: &Camera, ground_m: DVec3) -> Option<Self> {
+        let sight = ground_m - camera.position;
+        let pixels_per_metre = camera.focal_px / camera.depth(ground_m);
+        let descent = -sight.y / DVec2::new(sight.x, sight.z).length();
+        let usable = pixels_per_metre.is_finite() && pixels_per_metre > 0.0 && descent.is_finite();
+        usable.then_some(Self { pixels_per_metre, descent })
+    }
+}
+
+/// A joint in metres across the line of sight, and its depth in metres.
+#[derive(Clone, Copy)]
+struct Node {
+    at_m: DVec2,
+    depth_m: f64,
+}
+
+/// Three planes of [`GRID`]²: presence of a limb; depth of the nearest limb over a cell, or of the closest beside it,
+/// relative to the hips; depth of the upright plane through the hips. Depths in units of [`DEPTH_SCALE_M`].
+///
+/// `None` unless there are [`JOINTS`] joints.
+pub(super) fn paint(joints: &[Joint], window: &Window, view: View) -> Option<Vec<f32>> {
+    let nodes = nodes(joints, view.pixels_per_metre)?;
+    let pelvis_y_m = nodes.get(PELVIS)?.at_m.y;
+    let limbs = LIMBS
+        .iter()
+        .map(|&(a, b, radius_m)| Some((*nodes.get(a)?, *nodes.get(b)?, radius_m)))
+        .collect::<Option<Vec<_>>>()?;
+    let scaled = |metres: f64| (metres / DEPTH_SCALE_M).clamp(-DEPTH_CLIP, DEPTH_CLIP) as f32;
+    let (mut presence, mut depth, mut plane) = (Vec::new(), Vec::new(), Vec::new());
+    for row in 0..GRID {
+        for column in 0..GRID {
+            let at_px = DVec2::new(window.cell(0, column, GRID), window.cell(1, row, GRID));
+            let at_m = at_px / view.pixels_per_metre;
+            let (edge_m, depth_m) = nearest(&limbs, at_m);
+            presence.push((1.0 - edge_m / EDGE_M).clamp(0.0, 1.0) as f32);
+            depth.push(scaled(depth_m));
+            plane.push(scaled((at_m.y - pelvis_y_m) * view.descent));
+        }
+    }
+    presence.extend(depth);
+    presence.extend(plane);
+    Some(presence)
+}
+
+fn nodes(joints: &[Joint], pixels_per_metre: f64) -> Option<Vec<Node>> {
+    if joints.len() != JOINTS {
+        return None;
+    }
+    let mut nodes: Vec<Node> = joints
+        .iter()
+        .map(|j| Node { at_m: j.pixel / pixels_per_metre, depth_m: f64::from(j.depth_m) })
+        .collect();
+    for (a, b) in [(11, 12), (23, 24)] {
+        let (a, b): (&Node, &Node) = (nodes.get(a)?, nodes.get(b)?);
+        nodes.push(Node { at_m: (a.at_m + b.at_m) / 2.0, depth_m: (a.depth_m + b.depth_m) / 2.0 });
+    }
+    Some(nodes)
+}
+
+/// Distance to the closest limb's border (negative inside) and the depth to paint, metres.
+fn nearest(limbs: &[(Node, Node, f64)], at_m: DVec2) -> (f64, f64) {
+    let (mut edge_m, mut beside_m, mut covered_m) = (f64::INFINITY, 0.0, f64::INFINITY);
+    for (a, b, radius_m) in limbs {
+        let along = b.at_m - a.at_m;
+        let share = ((at_m - a.at_m).dot(along) / along.length_squared().max(1e-9)).clamp(0.0, 1.0);
+        let distance_m = (at_m - a.at_m - along * share).length() - radius_m;
+        let depth_m = a.depth_m + share * (b.depth_m - a.depth_m);
+        if distance_m <= 0.0 {
+            covered_m = depth_m.min(covered_m);
+        }
+        if distance_m < edge_m {
+            (edge_m, beside_m) = (distance_m, depth_m);
+        }
+    }
+    (edge_m, if covered_m.is_finite() { covered_m } else { beside_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything at the hips but one knee and ankle, which come 0.4 m to the front.
+    fn kick() -> Vec<Joint> {
+        let joint = |x: f64, y: f64, depth_m: f32| Joint { pixel: DVec2::new(x, y), depth_m, visibility: 1.0 };
+        let mut joints = vec![joint(50.0, 50.0, 0.0); JOINTS];
+        for i in [25, 27, 29, 31] {
+            joints[i] = joint(50.0, 70.0, -0.4);
+        }
+        joints
+    }
+
+    #[test]
+    fn a_limb_is_painted_where_it_is_with_its_depth() {
+        let window = Window { centre_px: DVec2::new(50.0, 50.0), side_px: 64.0 };
+        let view = View { pixels_per_metre: 32.0, descent: 0.25 };
+        let painted = paint(&kick(), &window, view).unwrap();
+        let at = |channel: usize, x: usize, y: usize| painted[(channel * GRID + y) * GRID + x];
+        assert_eq!(painted.len(), POSE_CHANNELS * GRID * GRID);
+        assert_eq!((at(0, 32, 52), at(0, 2, 2)), (1.0, 0.0));
+        assert!((at(1, 31, 51) + 0.8).abs() < 0.03, "the ankle is 0.4 m in front: {}", at(1, 31, 51));
+        assert!((at(1, 31, 41) + 0.4).abs() < 0.03, "halfway down the leg: {}", at(1, 31, 41));
+        let below = (16.5 / 32.0) * 0.25 / DEPTH_SCALE_M;
+        assert!((f64::from(at(2, 0, 48)) - below).abs() < 1e-6, "lower on the upright plane is further from a camera above");
+    }
+
+    #[test]
+    fn wild_depths_are_bounded_and_a_wrong_count_is_refused() {
+        let window = Window { centre_px: DVec2::ZERO, side_px: 64.0 };
+        let view = View { pixels_per_metre: 32.0, descent: 0.25 };
+        let mut joints = kick();
+        joints[27].depth_m = -1e30;
+        let painted = paint(&joints, &window, view).unwrap();
+        assert!(painted.iter().all(|v| v.abs() <= DEPTH_CLIP as f32));
+        assert_eq!(paint(&joints[1..], &window, view), None);
+    }
+}
