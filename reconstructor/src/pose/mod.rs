@@ -121,6 +121,17 @@ pub struct Person {
     pub neck_m: DVec3,
 }
 
+/// Joints and mask in one box of a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// The joints, [`JOINTS`] of them.
+    pub joints: Vec<Joint>,
+    /// Instance mask, without islands.
+    pub mask: Mask,
+    /// Confidence that it is a whole person, 0..1.
+    pub score: f32,
+}
+
 /// Why poses could not be estimated.
 #[derive(Debug, thiserror::Error)]
 pub enum PoseError {
@@ -142,6 +153,22 @@ impl PoseEstimator {
     /// When ONNX Runtime or the model is missing or unusable.
     pub fn load() -> Result<Self, PoseError> {
         Ok(Self { model: Model::load_shipped(MODEL)? })
+    }
+
+    /// What the network sees in one box, wherever it stands and however sure: for measuring the stages that build on poses.
+    ///
+    /// `None` when the box or the picture is empty.
+    ///
+    /// # Errors
+    /// When the network fails.
+    pub fn look(&mut self, picture: &RgbImage, bounds: &PixelBox) -> Result<Option<Look>, PoseError> {
+        let square = blazepose::Square::round(bounds);
+        if picture.is_empty() || !(square.side >= 1.0) || !square.centre.is_finite() {
+            return Ok(None);
+        }
+        let seen = blazepose::estimate(&mut self.model, picture, square)?;
+        let mask = silhouette::clean(&seen.mask, &seen.joints);
+        Ok(Some(Look { joints: seen.joints, mask, score: seen.score }))
     }
 
     /// Everybody of `detections` who can stand on the pitch, from left to right of the picture.
