@@ -244,6 +244,25 @@ def lowest_point(base: BaseMesh, rotations: np.ndarray) -> tuple[float, float]:
     return lowest, forward["l"] - forward["r"]
 
 
+def closed(rotations: np.ndarray) -> np.ndarray:
+    """A loop without jumps: joints that leap somewhere (the walk's arms do, where its halves meet) are smoothed."""
+    rotations = rotations.copy()
+    for joint in range(rotations.shape[1]):
+        track = rotations[:, joint]
+        for _ in range(40):
+            after = np.roll(track, -1, 0)
+            after = after * np.sign((track * after).sum(-1, keepdims=True))
+            step = np.linalg.norm(after - track, axis=-1)
+            if step.max() < 2.5 * np.median(step) + 0.04:
+                break
+            before = np.roll(track, 1, 0)
+            before = before * np.sign((track * before).sum(-1, keepdims=True))
+            track = before + 2 * track + after
+            track /= np.linalg.norm(track, axis=-1, keepdims=True)
+        rotations[:, joint] = track
+    return rotations
+
+
 def bake_motions(base: BaseMesh, source: zipfile.ZipFile, out: Path, names) -> None:
     files = {
         Path(n).stem.replace("humanoid3d_", ""): n
@@ -263,14 +282,8 @@ def bake_motions(base: BaseMesh, source: zipfile.ZipFile, out: Path, names) -> N
         measured = [lowest_point(base, r) for r in rotations]
         travel = float(np.linalg.norm((roots[-1] - roots[0])[[0, 2]]))
         if loops:
-            # The last frame repeats the first, but the walk's left arm jumps into it: drop it, carry the motion on by
-            # one frame, and spread what is missing to the first frame over the pass. Then start where the left foot
-            # is furthest ahead, so that gaits blend.
-            rotations, roots, measured = rotations[:-1], roots[:-1], measured[:-1]
-            ahead = 2 * rotations[-1] - rotations[-2]
-            closing = rotations[0] * np.sign((rotations[0] * ahead).sum(-1, keepdims=True)) - ahead
-            rotations = rotations + np.linspace(0, 1, len(rotations))[:, None, None] * closing
-            rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+            # The last frame repeats the first. Start where the left foot is furthest ahead, so that gaits blend.
+            rotations, roots, measured = closed(rotations[:-1]), roots[:-1], measured[:-1]
             shift = int(np.argmax([m[1] for m in measured]))
             rotations, roots = np.roll(rotations, -shift, 0), np.roll(roots, -shift, 0)
             measured = measured[shift:] + measured[:shift]

@@ -457,3 +457,94 @@ fn tempfile_beside(path: &Path) -> std::io::Result<(std::fs::File, PathBuf)> {
     let temporary = path.with_extension("partial");
     Ok((std::fs::File::create(&temporary)?, temporary))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(out: &Path, split: Split) -> DepthOptions {
+        DepthOptions {
+            out: out.to_owned(),
+            count: 6,
+            shard: 4,
+            seed: 11,
+            split,
+            motions: None,
+            height_px: [40.0, 120.0],
+        }
+    }
+
+    #[test]
+    fn an_aimed_camera_sees_its_target_where_it_should_with_a_level_horizon() {
+        let (position, target) = (DVec3::new(-7.0, 15.0, 70.0), DVec3::new(30.0, 0.0, -12.0));
+        for pixel in [DVec2::new(100.0, 650.0), DVec2::new(1200.0, 200.0), DVec2::new(640.0, 360.0)] {
+            let camera = aim((1280, 720), 2600.0, position, target, pixel);
+            assert!(camera.project(target).unwrap().distance(pixel) < 1e-6);
+            assert!(camera.rotation.row(0).y.abs() < 1e-9, "the picture's x axis is horizontal");
+        }
+    }
+
+    #[test]
+    fn offsets_lead_back_to_points_of_a_standing_body() {
+        let base = BaseBody::load().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let options = options(folder.path(), Split::Train);
+        let motions = Motions::shipped().unwrap();
+        let actions = gait::repertoire(&motions, false);
+        let cast = Cast::new(&base, &options, 0, 4);
+        for index in 0..4 {
+            let made = sample(&options, index, &cast, &actions).unwrap();
+            let (anchor, camera) = (DVec3::from(made.meta.anchor_m), made.meta.camera);
+            let [x0, y0, scale] = made.meta.crop;
+            let mut seen = 0;
+            for (place, &offset) in made.offsets_mm.iter().enumerate() {
+                let (i, j) = (place % OFFSETS, place / OFFSETS);
+                let masked = made.mask[2 * j * CROP + 2 * i] > 0;
+                if offset == NO_OFFSET {
+                    continue;
+                }
+                seen += usize::from(masked);
+                let pixel = DVec2::new(
+                    x0 + scale * (2 * i) as f64 + 0.5 * scale,
+                    y0 + scale * (2 * j) as f64 + 0.5 * scale,
+                );
+                let depth = plane_depth(&camera, anchor, pixel) + f64::from(offset) / 1000.0;
+                let ray = camera.ray(pixel);
+                let point = ray.origin + ray.direction * (depth / ray.direction.dot(camera.forward()));
+                assert!((-0.05..2.8).contains(&point.y), "a body point {} m high", point.y);
+                assert!((point - anchor).with_y(0.0).length() < 1.5);
+            }
+            let masked = made.mask.iter().filter(|&&m| m > 0).count();
+            assert!(seen * 4 > masked * 8 / 10 && masked > 1500, "{seen} offsets for {masked} mask pixels");
+        }
+    }
+
+    #[test]
+    fn a_set_is_the_same_twice_and_its_splits_share_nobody() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, split| {
+            let out = folder.path().join(name);
+            depth_crops(&options(&out, split), |_| ()).unwrap();
+            (
+                std::fs::read(out.join("shard-0001/crops.npy")).unwrap(),
+                std::fs::read_to_string(out.join("shard-0001/meta.jsonl")).unwrap(),
+            )
+        };
+        let (first, train) = write("a", Split::Train);
+        assert_eq!(first.len(), 128 + 2 * CROP * CROP * 3);
+        assert_eq!(write("b", Split::Train), (first, train.clone()));
+        let (_, test) = write("c", Split::Test);
+        let names = |text: &str, key: &str| -> Vec<String> {
+            text.lines()
+                .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()[key].to_string())
+                .collect()
+        };
+        for key in ["body", "kit", "motion"] {
+            let held_out = names(&test, key);
+            assert!(
+                names(&train, key).iter().all(|name| !held_out.contains(name)),
+                "{key} is in both splits"
+            );
+        }
+    }
+}

@@ -9,21 +9,32 @@
 use std::path::PathBuf;
 
 pub mod body;
+pub mod clip;
+pub mod correspondences;
 pub mod dataset;
 pub mod figure;
+pub mod fixture;
 pub mod gait;
 pub mod lettering;
 pub mod motion;
+pub mod movement;
 mod noise;
 mod npy;
+pub mod operator;
 pub mod outfit;
+pub mod overlay;
 mod packed;
 pub mod paint;
+pub mod props;
 pub mod raster;
 pub mod render;
 pub mod rig;
 pub mod sensor;
 pub mod stadium;
+pub mod trajectories;
+pub mod truth;
+
+pub use clip::{Options, Synthesized, synthesize};
 
 /// Why something could not be rendered or written.
 #[derive(Debug, thiserror::Error)]
@@ -50,6 +61,9 @@ pub enum SynthesisError {
     /// A picture could not be encoded or decoded.
     #[error("cannot encode a picture: {0}")]
     Picture(image::ImageError),
+    /// The video encoder could not be used.
+    #[error("cannot encode the video with the program `ffmpeg`: {0}; install it (`cargo xtask setup` does)")]
+    Encoder(std::io::Error),
     /// The options contradict each other.
     #[error("{0}")]
     Options(String),

@@ -159,7 +159,7 @@ impl Outfit {
         let skin = SKINS[tone].map(|c| (c * rng.random_range(0.94..1.06f32)).min(1.0));
         // Fair hair on dark skin is rare.
         let hair_choices = if tone >= 3 { 3 } else { HAIRS.len() };
-        let hair = (!rng.random_bool(0.1)).then(|| Hair {
+        let hair = (!rng.random_bool(0.05)).then(|| Hair {
             colour: HAIRS[rng.random_range(0..hair_choices)],
             volume_m: *[0.004, 0.008, 0.014, 0.02, 0.03].choose(rng).unwrap_or(&0.01),
             forehead_m: rng.random_range(0.135..0.16),

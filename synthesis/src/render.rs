@@ -189,7 +189,8 @@ impl<'a> Scene<'a> {
     fn shadows(&self, camera: &Camera, window: Window) -> Shadows {
         let grid = Grid::over_pixels(window.first, window.size, 1);
         let mut layers = Vec::new();
-        for (towards, _) in &self.stadium.lights.lamps {
+        // After the lamps comes the open sky: what stands over the grass keeps its light away straight below.
+        for towards in self.stadium.lights.lamps.iter().map(|(towards, _)| towards).chain([&Vec3::Y]) {
             let mut raster = Raster::new(grid);
             let mut projected = Vec::new();
             let mut flat = Vec::new();
@@ -205,6 +206,9 @@ impl<'a> Scene<'a> {
             let hard: Vec<f32> =
                 raster.triangle.iter().map(|&t| if t == NOTHING { 0.0 } else { 1.0 }).collect();
             layers.push(box_blur(&hard, window.size));
+        }
+        if let Some(sky) = layers.last_mut() {
+            *sky = box_blur(&box_blur(sky, window.size), window.size);
         }
         Shadows { width: window.size[0], layers }
     }

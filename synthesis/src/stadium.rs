@@ -140,7 +140,8 @@ impl Stadium {
         }
     }
 
-    /// What the camera sees at a pixel when nobody is there. `shadow` is the share of each lamp that is hidden.
+    /// What the camera sees at a pixel when nobody is there. `shadow` is the share of each lamp that is hidden, and
+    /// after the lamps of the sky.
     #[must_use]
     pub fn see(&self, rays: &PixelRays, pixel: Vec2, shadow: impl Fn(usize) -> f32) -> Seen {
         let direction = rays.direction(pixel);
@@ -159,13 +160,21 @@ impl Stadium {
             let mut offer = |depth: f32, wall: Wall, height: f32| {
                 if depth.is_finite() && depth > 0.5 && best.is_none_or(|(nearest, ..)| depth < nearest) {
                     let point = rays.origin + direction * depth;
-                    let along = if normal == Vec3::Z { point.x } else { point.z };
+                    // Along the wall from left to right, as somebody on the pitch reads it.
+                    let along = if normal == Vec3::Z { point.x } else { point.z * outward };
                     best = Some((depth, wall, along, height));
                 }
             };
             let depth = upright(place);
-            let height = (rays.origin + direction * depth).y;
-            if (0.0..BOARD_HEIGHT_M).contains(&height) {
+            let point = rays.origin + direction * depth;
+            let height = point.y;
+            // Boards meet at the corners.
+            let (along, end) = if normal == Vec3::Z {
+                (point.x, half_x + BOARD_GAP_M[1])
+            } else {
+                (point.z, half_z + BOARD_GAP_M[0])
+            };
+            if (0.0..BOARD_HEIGHT_M).contains(&height) && along.abs() <= end {
                 offer(depth, Wall::Board, height);
             }
             let foot = place + outward * STAND_GAP_M;
@@ -208,7 +217,8 @@ impl Stadium {
             let lamp_light = lamps.iter().enumerate().fold(Vec3::ZERO, |sum, (index, (towards, colour))| {
                 sum + *colour * towards.y * (1.0 - shadow(index))
             });
-            let light = light * (lamp_light + self.lights.sky);
+            let open = 1.0 - 0.6 * shadow(lamps.len());
+            let light = light * (lamp_light + self.lights.sky * open);
             return Seen { light, depth_m: depth, ground: Some(place) };
         }
         let Some((depth, wall, along, height)) = best else {
@@ -298,7 +308,7 @@ impl Stadium {
         const WIDTH: f32 = 9.0;
         let index = (along / WIDTH).floor();
         let x = along - index * WIDTH;
-        let pick = noise::hash(index as i32, 3, self.seed) as usize;
+        let pick = (index as i32 + 1000).unsigned_abs() as usize;
         let Some(board) = self.boards.get(pick % self.boards.len().max(1)) else { return Vec3::splat(0.1) };
         let glyph = 0.38;
         let width = lettering::width(&board.text) * glyph;
@@ -357,24 +367,25 @@ impl Stadium {
         }
         let tall = 0.92 + 0.16 * (key(33) - 0.5);
         let shade = 0.75 + 0.5 * key(34);
-        if u.powi(2) + (v - tall * 0.86).powi(2) < 0.0121 {
+        if u.powi(2) + (v - tall * 0.84).powi(2) < 0.0144 {
             let tone = key(35);
             return linear([0.78 - 0.4 * tone, 0.60 - 0.35 * tone, 0.50 - 0.32 * tone]) * shade * 0.8;
         }
-        if u.powi(2) + (v - tall * 0.90).powi(2) < 0.016 {
+        if u.powi(2) + (v - tall * 0.90).powi(2) < 0.0196 {
             return Vec3::splat(0.025); // hair and hats
         }
-        if u.abs() < 0.23 && v > 0.16 && v < tall * 0.78 {
+        let shoulders = 0.24 - 0.9 * (v - tall * 0.60).max(0.0);
+        if u.abs() < shoulders && v > 0.10 {
             let choice = key(36);
             let coat: Srgb = if choice < 0.42 {
                 let grey = 0.10 + 0.18 * key(37);
                 [grey, grey, grey * 1.12]
             } else if choice < 0.68 {
-                [0.35 + 0.5 * key(38), 0.35 + 0.5 * key(38), 0.4 + 0.5 * key(38)]
+                [0.30 + 0.42 * key(38), 0.30 + 0.42 * key(38), 0.34 + 0.42 * key(38)]
             } else if choice < 0.86 && !self.crowd.is_empty() {
                 self.crowd[(key(39) * self.crowd.len() as f32) as usize % self.crowd.len()]
             } else {
-                [key(40) * 0.9, key(41) * 0.8, key(42) * 0.8]
+                [0.1 + key(40) * 0.6, 0.1 + key(41) * 0.45, 0.1 + key(42) * 0.45]
             };
             let fold = 0.8 + 0.2 * (v - 0.16) / 0.6;
             return linear(coat) * shade * fold;

@@ -1,0 +1,364 @@
+//! The whole way: a rendered broadcast clip with its truth in a folder.
+
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+};
+
+use image::RgbImage;
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use crate::{
+    SynthesisError,
+    correspondences::clicked,
+    fixture::{Fixture, FixtureOptions},
+    operator::Tripod,
+    render::Window,
+    sensor::Sensor,
+    trajectories::Trajectories,
+    truth::{self, FrameTruth, Reduced, Truth},
+};
+
+/// Frames per second of every rendered clip.
+pub const FRAME_RATE: u32 = 25;
+
+/// What to render.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Folder for `clip.mp4`, `truth/`, `truth.json` and `correspondences.json`; made when missing.
+    pub out: PathBuf,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// Length in frames.
+    pub frames: u32,
+    /// Width and height of the picture, even numbers.
+    pub size_px: (u32, u32),
+    /// Recorded paths; generated ones when absent.
+    pub trajectories: Option<PathBuf>,
+    /// Where in the recording the clip starts.
+    pub start_seconds: f64,
+    /// Triangles of each true surface, about.
+    pub truth_triangles: u32,
+    /// Quality of the H.264 file: x264's CRF, 0 (best) to 51.
+    pub crf: u8,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            out: PathBuf::from("synthesized"),
+            seed: 1,
+            frames: 125,
+            size_px: (1280, 720),
+            trajectories: None,
+            start_seconds: 0.0,
+            truth_triangles: 1500,
+            crf: 20,
+        }
+    }
+}
+
+/// What was written.
+#[derive(Clone, Debug)]
+pub struct Synthesized {
+    /// The video.
+    pub clip: PathBuf,
+    /// Whether the paths were made up because no recording was given.
+    pub generated_paths: bool,
+    /// Frames.
+    pub frames: usize,
+    /// People in view per frame, on average.
+    pub people_in_view_mean: f64,
+}
+
+/// One rendered frame with its truth.
+pub struct RenderedFrame {
+    /// The picture.
+    pub picture: RgbImage,
+    /// What is in it.
+    pub truth: FrameTruth,
+}
+
+/// Renders a frame of a match: the picture that the broadcast shows.
+pub fn render_frame(fixture: &Fixture, frame: usize, seed: u64) -> Result<RgbImage, SynthesisError> {
+    let camera = fixture.cameras[frame];
+    let size = [camera.width_px as usize, camera.height_px as usize];
+    let light = fixture.scene(frame).render(&camera, Window { first: [0, 0], size }, 3);
+    let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ (frame as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    let mut picture = Sensor::clean().expose(&light, rng)?;
+    fixture.score.draw(&mut picture, frame as f64 / f64::from(FRAME_RATE));
+    Ok(picture)
+}
+
+/// Renders a clip with its truth. `progress` is called with the number of finished frames.
+///
+/// The `ffmpeg` program encodes the video; it is needed here only, not to reconstruct or to play.
+pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<Synthesized, SynthesisError> {
+    let (width, height) = options.size_px;
+    if !(64..=7680).contains(&width) || !(64..=4320).contains(&height) || width % 2 + height % 2 > 0 {
+        let message =
+            format!("the picture size {width}x{height} must be even and between 64x64 and 7680x4320");
+        return Err(SynthesisError::Options(message));
+    }
+    let count = options.frames as usize;
+    let paths = match &options.trajectories {
+        Some(path) => Trajectories::open(path)?,
+        None => {
+            Trajectories::generated(options.seed, f64::from(options.frames) / f64::from(FRAME_RATE) + 1.0)
+        }
+    };
+    let fixture = Fixture::new(
+        &paths,
+        &FixtureOptions {
+            seed: options.seed,
+            frames: count,
+            rate_hz: f64::from(FRAME_RATE),
+            size_px: options.size_px,
+            start_seconds: options.start_seconds,
+            tripod: Tripod::default(),
+        },
+    )?;
+    std::fs::create_dir_all(&options.out).map_err(|source| SynthesisError::Io {
+        path: options.out.clone(),
+        doing: "create",
+        source,
+    })?;
+    let rows = fixture.members.len();
+    let reduced: Vec<Reduced> = fixture
+        .members
+        .iter()
+        .enumerate()
+        .map(|(row, member)| Reduced::new(&member.figure, options.truth_triangles as usize, row, rows))
+        .collect();
+    let palette = truth::palette(&fixture.members)?;
+
+    let clip = options.out.join("clip.mp4");
+    let mut video = Video::start(&clip, options)?;
+    let (mut frames, mut stream) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let together = rayon::current_num_threads().max(1);
+    for first in (0..count).step_by(together) {
+        let batch: Vec<_> = (first..(first + together).min(count))
+            .into_par_iter()
+            .map(|frame| {
+                let picture = render_frame(&fixture, frame, options.seed)?;
+                let scene = fixture.scene(frame);
+                let truth = truth::frame_truth(&fixture, &scene, frame);
+                let bodies = truth::stream_frame(&fixture, &scene, &truth, &reduced, &palette);
+                Ok((picture, truth, bodies))
+            })
+            .collect::<Result<_, SynthesisError>>()?;
+        for (picture, truth, bodies) in batch {
+            video.push(&picture)?;
+            frames.push(truth);
+            stream.push(bodies);
+            progress(frames.len());
+        }
+    }
+    video.finish()?;
+
+    let in_view: usize = frames.iter().map(|f| f.people.iter().filter(|p| p.in_view).count()).sum();
+    truth::write_stream(&options.out.join("truth"), &fixture, stream, FRAME_RATE, options.truth_triangles)?;
+    let mut rng = Pcg64Mcg::seed_from_u64(options.seed ^ 0xC11C);
+    let points = clicked(&fixture.cameras[0], &fixture.stadium.pitch, 0, 10, &mut rng);
+    put_json(&options.out.join("correspondences.json"), &points, Layout::Indented)?;
+    let truth = Truth {
+        frame_rate: [FRAME_RATE, 1],
+        pitch: fixture.stadium.pitch,
+        people: truth::people_truth(&fixture.members),
+        frames,
+    };
+    put_json(&options.out.join("truth.json"), &truth, Layout::Compact)?;
+    Ok(Synthesized {
+        clip,
+        generated_paths: options.trajectories.is_none(),
+        frames: count,
+        people_in_view_mean: in_view as f64 / count as f64,
+    })
+}
+
+enum Layout {
+    Indented,
+    Compact,
+}
+
+fn put_json(path: &Path, value: &impl serde::Serialize, layout: Layout) -> Result<(), SynthesisError> {
+    let text = match layout {
+        Layout::Indented => serde_json::to_string_pretty(value),
+        Layout::Compact => serde_json::to_string(value),
+    };
+    let broken = |error: serde_json::Error| SynthesisError::Asset {
+        what: path.display().to_string(),
+        reason: error.to_string(),
+    };
+    truth::put(path, (text.map_err(broken)? + "\n").as_bytes())
+}
+
+/// An H.264 file being written by the `ffmpeg` program.
+struct Video {
+    path: PathBuf,
+    process: Child,
+}
+
+impl Video {
+    fn start(path: &Path, options: &Options) -> Result<Self, SynthesisError> {
+        let (width, height) = options.size_px;
+        let process = Command::new("ffmpeg")
+            .args(["-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
+            .args(["-s", &format!("{width}x{height}"), "-r", &FRAME_RATE.to_string(), "-i", "-"])
+            .args(["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"])
+            .args([
+                "-c:v",
+                "libx264",
+                "-preset",
+                "slow",
+                "-crf",
+                &options.crf.to_string(),
+                "-g",
+                "50",
+                "-threads",
+                "1",
+            ])
+            .args(["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"])
+            .args([
+                "-color_range",
+                "tv",
+                "-fflags",
+                "+bitexact",
+                "-flags:v",
+                "+bitexact",
+                "-movflags",
+                "+faststart",
+            ])
+            .arg(path)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::inherit())
+            .spawn()
+            .map_err(SynthesisError::Encoder)?;
+        Ok(Self { path: path.to_owned(), process })
+    }
+
+    fn push(&mut self, picture: &RgbImage) -> Result<(), SynthesisError> {
+        let stopped = || std::io::Error::new(std::io::ErrorKind::BrokenPipe, "it takes no pictures");
+        let pipe = self.process.stdin.as_mut().ok_or_else(stopped).map_err(SynthesisError::Encoder)?;
+        pipe.write_all(picture.as_raw()).map_err(SynthesisError::Encoder)
+    }
+
+    fn finish(mut self) -> Result<(), SynthesisError> {
+        drop(self.process.stdin.take());
+        let status = self.process.wait().map_err(SynthesisError::Encoder)?;
+        if !status.success() {
+            let message = format!("ffmpeg left with {status} while writing {}", self.path.display());
+            return Err(SynthesisError::Options(message));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use protocol::{chunk, limits::Limits, manifest::Manifest};
+
+    fn small(seed: u64) -> Fixture {
+        let options = FixtureOptions {
+            seed,
+            frames: 3,
+            rate_hz: 25.0,
+            size_px: (320, 180),
+            start_seconds: 0.5,
+            tripod: Tripod::default(),
+        };
+        Fixture::new(&Trajectories::generated(seed, 2.0), &options).unwrap()
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_picture_and_another_seed_does_not() {
+        let picture = |seed| render_frame(&small(seed), 1, seed).unwrap();
+        let first = picture(5);
+        assert_eq!(first, picture(5));
+        assert_ne!(first, picture(6));
+    }
+
+    #[test]
+    fn true_people_lie_in_their_boxes_and_stand_on_the_pitch() {
+        let fixture = small(5);
+        let scene = fixture.scene(2);
+        let truth = truth::frame_truth(&fixture, &scene, 2);
+        let in_view: Vec<_> = truth.people.iter().filter(|p| p.in_view).collect();
+        assert!(in_view.len() >= 4, "{} people in view", in_view.len());
+        for person in in_view {
+            let [left, top, right, bottom] = person.box_px;
+            for (joint, [x, y]) in person.joints_px.iter().enumerate() {
+                // Knuckles are guessed beyond the wrist and may stick out a little.
+                let slack = 0.12 * (bottom - top);
+                let inside =
+                    *x > left - slack && *x < right + slack && *y > top - slack && *y < bottom + slack;
+                assert!(
+                    inside,
+                    "joint {joint} of person {} at {x}, {y} leaves {:?}",
+                    person.id, person.box_px
+                );
+            }
+            let anchor = DVec3::from(person.anchor_m);
+            assert!(anchor.y.abs() < 1e-9);
+            let hips = (DVec3::from(person.joints_m[23]) + DVec3::from(person.joints_m[24])) / 2.0;
+            assert!((hips - anchor).with_y(0.0).length() < 0.01, "hips over the anchor");
+            assert!((0.5..1.3).contains(&hips.y));
+            let pixel = truth.camera.project(anchor).unwrap();
+            assert!(pixel.x > left && pixel.x < right && pixel.y > top && pixel.y < bottom + 8.0);
+        }
+    }
+
+    #[test]
+    fn a_clip_is_written_with_a_truth_stream_that_reads_back() {
+        if Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).status().is_err() {
+            println!("skipped: the program ffmpeg is not installed");
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options {
+            out: folder.path().join("clip"),
+            seed: 3,
+            frames: 2,
+            size_px: (320, 180),
+            truth_triangles: 300,
+            ..Options::default()
+        };
+        let done = synthesize(&options, |_| ()).unwrap();
+        assert!(done.generated_paths && done.people_in_view_mean >= 3.0);
+        assert!(std::fs::metadata(&done.clip).unwrap().len() > 1000);
+        let read = |name: &str| std::fs::read(options.out.join(name)).unwrap();
+        let manifest = Manifest::from_json(&read("truth/match.json"), &Limits::default()).unwrap();
+        let entry = &manifest.best().unwrap().chunks[0].file;
+        let bytes = read(&format!("truth/{}", entry.path));
+        protocol::hash::verify(&bytes, entry).unwrap();
+        let chunk = chunk::decode(&bytes, &Limits::default()).unwrap();
+        let truth: serde_json::Value = serde_json::from_slice(&read("truth.json")).unwrap();
+        assert_eq!(chunk.frames.len(), 2);
+        for (frame, content) in chunk.frames.iter().enumerate() {
+            let people = truth["frames"][frame]["people"].as_array().unwrap();
+            assert_eq!(content.bodies.len(), people.iter().filter(|p| p["in_view"] == true).count());
+            for body in &content.bodies {
+                let lowest = body.mesh.positions_m.iter().map(|p| p[1]).fold(f32::MAX, f32::min);
+                let highest = body.mesh.positions_m.iter().map(|p| p[1]).fold(f32::MIN, f32::max);
+                assert!(
+                    lowest > -0.05 && lowest < 0.2 && highest > 1.2 && highest < 2.6,
+                    "{lowest} to {highest} m"
+                );
+            }
+        }
+        let points: serde_json::Value = serde_json::from_slice(&read("correspondences.json")).unwrap();
+        assert!(points["points"].as_array().unwrap().len() >= 4);
+    }
+
+    #[test]
+    fn an_odd_picture_size_is_refused() {
+        let options = Options { size_px: (321, 180), ..Options::default() };
+        assert!(matches!(synthesize(&options, |_| ()), Err(SynthesisError::Options(_))));
+    }
+}
