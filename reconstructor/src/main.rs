@@ -1,2 +1,224 @@
-//! placeholder
-fn main() {}
+//! `reconstructor`: clip to stream, and the tools around it. Exit codes: 0 done, 1 failed on the input, 2 wrong usage.
+
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
+mod cli;
+
+use std::{
+    io::{IsTerminal, Write},
+    path::Path,
+    process::ExitCode,
+};
+
+use anyhow::{Context, Result, bail};
+use clap::Parser;
+use protocol::limits::Limits;
+use reconstructor::{
+    calibration::command::{self, CalibrateOptions},
+    encode::read_stream,
+    evaluate::{depth, matches},
+    mesh::MeshBudget,
+    pipeline::{ReconstructOptions, reconstruct},
+    report::{Progress, Reporter},
+    serve::serve,
+    tracking::TrackingLimits,
+    trajectory::Smoothing,
+};
+use serde::Serialize;
+use tracing_subscriber::EnvFilter;
+
+use cli::{Cli, Command, Evaluate};
+
+fn main() -> ExitCode {
+    // clap ends the program with 2 on wrong usage and 0 on --help.
+    let cli = Cli::parse();
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_target(false)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .init();
+    match run(cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", one_line(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
+        Command::Reconstruct(arguments) => run_reconstruct(arguments),
+        Command::Calibrate(arguments) => run_calibrate(arguments),
+        Command::Synthesize(arguments) => run_synthesize(arguments),
+        Command::Evaluate(Evaluate::Match(arguments)) => run_evaluate_match(&arguments),
+        Command::Evaluate(Evaluate::Depth(arguments)) => {
+            let progress = Progress::new("depth", 0);
+            let figures = depth::depth(&arguments.data, |_| progress.advance(1))?;
+            drop(progress);
+            write_figures(&arguments.json, &figures)
+        }
+        Command::Serve(arguments) => Ok(serve(&arguments.stream, arguments.listen)?),
+    }
+}
+
+fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
+    let Some(calibration) = arguments.calibration else {
+        bail!(
+            "{}: this version needs --calibration POINTS.json, four or more pitch points of one frame; see `reconstructor calibrate --help`",
+            arguments.clip.display()
+        );
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let options = ReconstructOptions {
+        clip: arguments.clip,
+        out: arguments.out,
+        calibration,
+        frames: arguments.frames,
+        work: arguments.work,
+        budget: MeshBudget { triangles: arguments.triangles as usize },
+        tracking: TrackingLimits::default(),
+        smoothing: Smoothing::default(),
+        threads: arguments.threads.map_or(cores, usize::from),
+    };
+    let mut reporter = Reporter::new();
+    let report = reconstruct(&options, &mut reporter).with_context(|| match &options.work {
+        Some(work) => format!("not finished; what is done stays in {}", work.display()),
+        None => "not finished; with --work DIR the next run would resume".to_owned(),
+    })?;
+    if let Some(path) = &arguments.report {
+        write_json(path, &report)?;
+    }
+    let residual = report.line_residual_median_px.map_or("no".to_owned(), |px| format!("{px:.2} px"));
+    println!(
+        "{}: {} frames, {} cameras, {residual} median line residual, {} people, {:.1} with a mesh per frame, {:.1} s per frame",
+        options.out.display(),
+        report.frames,
+        report.cameras_solved,
+        report.people,
+        report.people_with_mesh_mean,
+        report.seconds_per_frame,
+    );
+    Ok(())
+}
+
+fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
+    let options = CalibrateOptions {
+        inputs: arguments.inputs,
+        calibration: arguments.calibration,
+        frames: arguments.frames,
+        out: arguments.out,
+        overlay: arguments.overlay,
+    };
+    let progress = Progress::new("calibration", 0);
+    let report = command::run(&options, &progress)?;
+    drop(progress);
+    println!(
+        "{}: {} of {} cameras, {:.2} px median line residual, {:.2} px worst frame",
+        options.out.display(),
+        report.solved,
+        report.frames.len(),
+        report.line_residual_median_px,
+        report.line_residual_worst_px,
+    );
+    Ok(())
+}
+
+fn run_synthesize(arguments: cli::Synthesize) -> Result<()> {
+    let options = synthesis::Options {
+        out: arguments.out,
+        seed: arguments.seed,
+        frames: arguments.frames,
+        size_px: arguments.size,
+        trajectories: arguments.trajectories,
+        ..synthesis::Options::default()
+    };
+    let progress = Progress::new("synthesis", u64::from(options.frames));
+    // The callback gets the number of finished frames.
+    let made = synthesis::synthesize(&options, |done| {
+        progress.advance((done as u64).saturating_sub(progress.done()));
+    })?;
+    drop(progress);
+    if made.generated_paths {
+        tracing::warn!("no --trajectories given: the players run on made-up paths");
+    }
+    println!(
+        "{}: {} frames, {:.1} people in view per frame",
+        made.clip.display(),
+        made.frames,
+        made.people_in_view_mean
+    );
+    Ok(())
+}
+
+fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
+    let limits = Limits::default();
+    let truth = arguments.data.join("truth");
+    let frames = |folder: &Path| -> Result<Vec<_>> {
+        let (_, chunks) = read_stream(folder, &limits)?;
+        Ok(chunks.into_iter().flat_map(|chunk| chunk.frames).collect())
+    };
+    let truth = frames(&truth)
+        .context("the true stream cannot be read; --data names the folder that holds truth/")?;
+    let ours = frames(&arguments.stream).context("the reconstructed stream cannot be read")?;
+    write_figures(&arguments.json, &matches::compare(&truth, &ours))
+}
+
+/// Writes figures to a file and to standard output.
+fn write_figures(path: &Path, figures: &impl Serialize) -> Result<()> {
+    write_json(path, figures)?;
+    println!("{}", serde_json::to_string_pretty(figures)?);
+    Ok(())
+}
+
+/// Writes a JSON file whole or not at all.
+fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let write = || -> Result<()> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        std::fs::create_dir_all(folder)?;
+        let mut file = tempfile::NamedTempFile::new_in(folder)?;
+        serde_json::to_writer_pretty(&mut file, value)?;
+        file.write_all(b"\n")?;
+        file.persist(path)?;
+        Ok(())
+    };
+    write().with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// An error and its causes on one line, each cause once.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let cause = cause.to_string().replace('\n', "; ");
+        if !line.ends_with(&cause) {
+            line += if line.is_empty() { "" } else { ": " };
+            line += &cause;
+        }
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_one_line_without_repetition() {
+        let error = anyhow::anyhow!("no such file")
+            .context("cannot read a.mp4: no such file")
+            .context("not\nfinished");
+        assert_eq!(one_line(&error), "not; finished: cannot read a.mp4: no such file");
+    }
+
+    #[test]
+    fn json_is_written_whole_and_the_place_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/figures.json");
+        write_json(&path, &[1, 2]).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "[\n  1,\n  2\n]\n");
+        let error = write_json(&path.join("below"), &[1]).unwrap_err();
+        assert!(one_line(&error).contains("figures.json"), "{error:#}");
+    }
+}

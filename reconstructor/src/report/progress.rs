@@ -32,7 +32,7 @@ enum Output {
 }
 
 impl Progress {
-    /// Progress of `stage` over `total` steps, shown on standard error: a bar when that is a terminal, else log lines.
+    /// Progress of `stage` over `total` steps (0: not known), shown on standard error: a bar when that is a terminal, else log lines.
     #[must_use]
     pub fn new(stage: &str, total: u64) -> Self {
         let output = if std::io::stderr().is_terminal() {
@@ -66,7 +66,10 @@ impl Progress {
                     && last.elapsed() >= LINE_EVERY
                 {
                     *last = Instant::now();
-                    tracing::info!("{}: {done} of {}", self.stage, self.total);
+                    match self.total {
+                        0 => tracing::info!("{}: {done}", self.stage),
+                        total => tracing::info!("{}: {done} of {total}", self.stage),
+                    }
                 }
             }
             Output::Hidden => {}

@@ -1,0 +1,208 @@
+//! The command line of `reconstructor`: what can be asked for, in which words.
+
+use std::{net::SocketAddr, ops::Range, path::PathBuf};
+
+use clap::{Args, Parser, Subcommand};
+
+/// Turns a broadcast football clip into a match that stands on a table.
+#[derive(Debug, Parser)]
+#[command(version, about, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Reconstruct a clip into a stream that players show.
+    #[command(
+        after_help = "Example:\n  reconstructor reconstruct clip.mp4 --frames 150..450 --calibration points.json --out stream --work work --report report.json"
+    )]
+    Reconstruct(Reconstruct),
+    /// Find the camera of every frame of a clip, or of pictures of one shot.
+    #[command(
+        after_help = "Example:\n  reconstructor calibrate clip.mp4 --calibration points.json --out cameras.json --overlay overlays"
+    )]
+    Calibrate(Calibrate),
+    /// Render a broadcast clip of a match together with its ground truth.
+    #[command(
+        after_help = "Example:\n  reconstructor synthesize --out demo --seed 7 --frames 100 --size 1280x720"
+    )]
+    Synthesize(Synthesize),
+    /// Measure results against ground truth.
+    #[command(subcommand)]
+    Evaluate(Evaluate),
+    /// Serve a stream over HTTP until Ctrl-C.
+    #[command(after_help = "Example:\n  reconstructor serve stream --listen 127.0.0.1:8420")]
+    Serve(Serve),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Reconstruct {
+    /// The clip: H.264, HEVC or AV1 in any common file.
+    pub(crate) clip: PathBuf,
+    /// Folder for the stream; an older stream in it is replaced.
+    #[arg(long, value_name = "STREAM")]
+    pub(crate) out: PathBuf,
+    /// Four or more points of the pitch seen in one frame of the range. This version cannot do without.
+    #[arg(long, value_name = "POINTS.json")]
+    pub(crate) calibration: Option<PathBuf>,
+    /// Frames of the clip, from A up to but without B; all when not given.
+    #[arg(long, value_name = "A..B", value_parser = frame_range)]
+    pub(crate) frames: Option<Range<u32>>,
+    /// Folder that keeps the results of stages, so that interrupted work resumes.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) work: Option<PathBuf>,
+    /// Write figures per frame and stage, and everything that was left out.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) report: Option<PathBuf>,
+    /// Triangles per body at most.
+    #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(50..=100_000))]
+    pub(crate) triangles: u32,
+    /// Frames worked on at a time; one per core when not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Calibrate {
+    /// One clip, or pictures of one shot in order.
+    #[arg(required = true, value_name = "CLIP|IMAGE")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// Four or more points of the pitch seen in one frame.
+    #[arg(long, value_name = "POINTS.json")]
+    pub(crate) calibration: PathBuf,
+    /// Where the cameras go.
+    #[arg(long, value_name = "CAMERAS.json")]
+    pub(crate) out: PathBuf,
+    /// Frames of the clip, from A up to but without B; all when not given.
+    #[arg(long, value_name = "A..B", value_parser = frame_range)]
+    pub(crate) frames: Option<Range<u32>>,
+    /// Folder for pictures with the pitch lines drawn in.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) overlay: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Synthesize {
+    /// Folder for the clip and its truth.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Everything random follows from it: the same seed gives the same clip.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Length of the clip in frames.
+    #[arg(long, value_name = "N", default_value_t = 125, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) frames: u32,
+    /// Width and height of the picture in pixels, even numbers.
+    #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
+    pub(crate) size: (u32, u32),
+    /// Recorded paths of players and ball; made up when not given.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) trajectories: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Evaluate {
+    /// A reconstructed stream against the true one in DATA/truth.
+    #[command(
+        after_help = "Example:\n  reconstructor evaluate match --data assets/demo --stream target/demo/stream --json match.json"
+    )]
+    Match(EvaluateMatch),
+    /// Depth of rendered players against their true depth.
+    #[command(after_help = "Example:\n  reconstructor evaluate depth --data heldout --json depth.json")]
+    Depth(EvaluateDepth),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateMatch {
+    /// Folder that holds the true stream as `truth/match.json`.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// The reconstructed stream.
+    #[arg(long, value_name = "STREAM")]
+    pub(crate) stream: PathBuf,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateDepth {
+    /// Folder of rendered players with their depth.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Serve {
+    /// Folder of the stream.
+    pub(crate) stream: PathBuf,
+    /// Address and port.
+    #[arg(long, value_name = "ADDR", default_value = reconstructor::serve::DEFAULT_ADDRESS)]
+    pub(crate) listen: SocketAddr,
+}
+
+/// `A..B` as a range of frames that is not empty.
+fn frame_range(text: &str) -> Result<Range<u32>, String> {
+    let wrong = || format!("`{text}` is not a range of frames; write it as 150..450");
+    let (start, end) = text.split_once("..").ok_or_else(wrong)?;
+    let (start, end) = (start.trim().parse().map_err(|_| wrong())?, end.trim().parse().map_err(|_| wrong())?);
+    if start < end {
+        Ok(start..end)
+    } else {
+        Err(format!("`{text}` holds no frames; the end must be larger"))
+    }
+}
+
+/// `WxH` as a size in pixels.
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || format!("`{text}` is not a size; write it as 1280x720");
+    let (width, height) = text.split_once('x').ok_or_else(wrong)?;
+    Ok((width.parse().map_err(|_| wrong())?, height.parse().map_err(|_| wrong())?))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn ranges_are_read_and_bad_ones_explained() {
+        assert_eq!(frame_range("150..450"), Ok(150..450));
+        for wrong in ["", "5", "5..", "..5", "a..b", "-1..5", "5..5", "9..5", "0..4294967296"] {
+            let message = frame_range(wrong).unwrap_err();
+            assert!(message.contains(wrong), "{message}");
+        }
+    }
+
+    #[test]
+    fn sizes_are_read_and_bad_ones_explained() {
+        assert_eq!(size("1280x720"), Ok((1280, 720)));
+        for wrong in ["", "1280", "1280x", "x720", "-1x5", "a×b"] {
+            assert!(size(wrong).unwrap_err().contains("1280x720"));
+        }
+    }
+
+    #[test]
+    fn every_command_shows_an_example() {
+        fn check(command: &clap::Command) {
+            let children: Vec<_> = command.get_subcommands().collect();
+            if children.is_empty() {
+                let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+                assert!(help.contains("Example"), "{} has no example", command.get_name());
+            }
+            children.into_iter().for_each(check);
+        }
+        check(&Cli::command());
+    }
+}
