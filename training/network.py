@@ -7,6 +7,7 @@ below: the shape of a body is decided by its pose, the 64² level only has to fo
 
 import torch
 from torch import nn
+from torch.nn import functional
 
 BINS = 49
 BIN_M = 0.02
@@ -35,7 +36,7 @@ class Block(nn.Module):
 class DepthNetwork(nn.Module):
     """See the module's text. `widths` are those of the levels 32², 16², 8², 4²; `blocks` their encoder's depths."""
 
-    def __init__(self, widths=(32, 64, 128, 192), blocks=(2, 2, 2, 2), fine=24):
+    def __init__(self, widths=(28, 56, 96, 128), blocks=(2, 2, 2, 2), fine=20):
         super().__init__()
         self.stem = _convolution(4, 16, 4, stride=2, padding=1)
         seen = 16 + 3
@@ -49,7 +50,8 @@ class DepthNetwork(nn.Module):
         self.smooth = nn.Sequential(nn.Conv2d(fine, fine, 5, padding=2, groups=fine, bias=False), nn.BatchNorm2d(fine), nn.ReLU(inplace=True))
         self.head = nn.Conv2d(2 * fine, BINS + 1, 1)
 
-    def forward(self, picture, pose):
+    def features(self, picture, pose):
+        """What the classes are read from, N×C×64×64."""
         seen = torch.cat([self.stem(picture * 4.0 - 2.0), pose], 1)
         x, levels = seen, []
         for down, stage in zip(self.down, self.encoder):
@@ -58,7 +60,14 @@ class DepthNetwork(nn.Module):
         for level in range(len(self.lateral) - 1, -1, -1):
             x = self.decoder[level](levels[level] + self.twice(self.lateral[level](x)))
         fine = self.fine(seen) + self.twice(self.coarse(x))
-        return self.head(torch.cat([fine, self.smooth(fine)], 1))
+        return torch.cat([fine, self.smooth(fine)], 1)
+
+    def forward(self, picture, pose):
+        return self.head(self.features(picture, pose))
+
+    def classes_at(self, features, cells):
+        """Logits (M, 50) of the cells that `cells` (N×64×64 bool) chooses: all that training needs, at a fifth of the time."""
+        return functional.linear(features.permute(0, 2, 3, 1)[cells], self.head.weight[:, :, 0, 0], self.head.bias)
 
 
 def read_out(classes):
