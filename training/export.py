@@ -12,12 +12,17 @@ from window import GRID, PICTURE_SIZE
 
 
 class Exported(torch.nn.Module):
+    """The mean of what the network says of a player and of the mirrored player: steadier, for twice the time."""
+
     def __init__(self, network):
         super().__init__()
         self.network = network
 
     def forward(self, picture, pose):
-        return read_out(self.network(picture, pose))
+        both = self.network(torch.cat([picture, picture.flip(3)]), torch.cat([pose, pose.flip(3)]))
+        offset, presence = read_out(both)
+        (plain, mirrored), (here, there) = offset.chunk(2), presence.chunk(2)
+        return (plain + mirrored.flip(2)) / 2, (here + there.flip(2)) / 2
 
 
 def main():
