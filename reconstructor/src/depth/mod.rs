@@ -115,7 +115,11 @@ impl DepthEstimator {
     ) -> Result<WindowSurface, DepthError> {
         let pixels = u64::from(mask.width) * u64::from(mask.height);
         if pixels > MOST_PIXELS || pixels != mask.coverage.len() as u64 {
-            return Err(DepthError::BrokenMask { width: mask.width, height: mask.height, found: mask.coverage.len() });
+            return Err(DepthError::BrokenMask {
+                width: mask.width,
+                height: mask.height,
+                found: mask.coverage.len(),
+            });
         }
         let usable = joints.iter().filter(|j| j.pixel.is_finite() && j.depth_m.is_finite()).count();
         let broken_pose = DepthError::BrokenPose { found: usable };

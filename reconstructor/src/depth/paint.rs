@@ -139,7 +139,8 @@ mod tests {
 
     /// Everything at the hips but one knee and ankle, which come 0.4 m to the front.
     fn kick() -> Vec<Joint> {
-        let joint = |x: f64, y: f64, depth_m: f32| Joint { pixel: DVec2::new(x, y), depth_m, visibility: 1.0 };
+        let joint =
+            |x: f64, y: f64, depth_m: f32| Joint { pixel: DVec2::new(x, y), depth_m, visibility: 1.0 };
         let mut joints = vec![joint(50.0, 50.0, 0.0); JOINTS];
         for i in [25, 27, 29, 31] {
             joints[i] = joint(50.0, 70.0, -0.4);
@@ -158,7 +159,10 @@ mod tests {
         assert!((at(1, 31, 51) + 0.8).abs() < 0.03, "the ankle is 0.4 m in front: {}", at(1, 31, 51));
         assert!((at(1, 31, 41) + 0.4).abs() < 0.03, "halfway down the leg: {}", at(1, 31, 41));
         let below = (16.5 / 32.0) * 0.25 / DEPTH_SCALE_M;
-        assert!((f64::from(at(2, 0, 48)) - below).abs() < 1e-6, "lower on the upright plane is further from a camera above");
+        assert!(
+            (f64::from(at(2, 0, 48)) - below).abs() < 1e-6,
+            "lower on the upright plane is further from a camera above"
+        );
     }
 
     #[test]

@@ -35,7 +35,8 @@ impl Vector {
     }
 
     fn joints(&self) -> Vec<Joint> {
-        let joint = |&[x, y, z]: &[f64; 3]| Joint { pixel: DVec2::new(x, y), depth_m: z as f32, visibility: 1.0 };
+        let joint =
+            |&[x, y, z]: &[f64; 3]| Joint { pixel: DVec2::new(x, y), depth_m: z as f32, visibility: 1.0 };
         self.joints.iter().map(joint).collect()
     }
 }
@@ -93,7 +94,8 @@ fn the_network_says_here_what_it_says_to_the_trainer() {
 fn a_depth_map_covers_the_mask_and_stays_near_the_plane() {
     let Some(mut estimator) = estimator() else { return };
     let (image, mask) = player();
-    let camera = Camera::looking_at((64, 64), 60.0 * 29.0, DVec3::new(0.0, 15.0, 60.0), DVec3::new(0.0, 1.0, 0.0));
+    let camera =
+        Camera::looking_at((64, 64), 60.0 * 29.0, DVec3::new(0.0, 15.0, 60.0), DVec3::new(0.0, 1.0, 0.0));
     let person = Person {
         bounds: PixelBox { min: DVec2::ZERO, max: DVec2::splat(63.0) },
         score: 1.0,
@@ -127,8 +129,14 @@ fn hostile_input_is_a_typed_error() {
     assert!(matches!(estimator.surface(&image, view, &joints, &huge), Err(DepthError::BrokenMask { .. })));
     let mut broken = joints.clone();
     broken[27].pixel.x = f64::NAN;
-    assert!(matches!(estimator.surface(&image, view, &broken, &mask), Err(DepthError::BrokenPose { found: 32 })));
-    assert!(matches!(estimator.surface(&image, view, &joints[..4], &mask), Err(DepthError::BrokenPose { found: 4 })));
+    assert!(matches!(
+        estimator.surface(&image, view, &broken, &mask),
+        Err(DepthError::BrokenPose { found: 32 })
+    ));
+    assert!(matches!(
+        estimator.surface(&image, view, &joints[..4], &mask),
+        Err(DepthError::BrokenPose { found: 4 })
+    ));
     let nothing = RgbImage::new(0, 0);
     assert!(matches!(estimator.surface(&nothing, view, &joints, &mask), Err(DepthError::OutOfView)));
     let camera = Camera::looking_at((64, 64), 900.0, DVec3::new(0.0, 15.0, 60.0), DVec3::ZERO);

@@ -186,7 +186,8 @@ fn measure(
 
 /// Whether a block of 2×2 pixels belongs to the mask more than not.
 fn covered(mask: &crate::geometry::Mask, x: i32, y: i32) -> bool {
-    let sum: u32 = [(0, 0), (1, 0), (0, 1), (1, 1)].iter().map(|&(i, j)| u32::from(mask.at(x + i, y + j))).sum();
+    let sum: u32 =
+        [(0, 0), (1, 0), (0, 1), (1, 1)].iter().map(|&(i, j)| u32::from(mask.at(x + i, y + j))).sum();
     sum >= 4 * 128
 }
 
@@ -279,7 +280,8 @@ fn read_meta(path: &Path) -> Result<Vec<Meta>, DepthEvaluationError> {
     let mut lines = Vec::new();
     for (i, line) in BufReader::new(File::open(path).map_err(io)?).lines().enumerate() {
         let line = line.map_err(io)?;
-        let wrong = |reason: String| DepthEvaluationError::Meta { path: path.to_path_buf(), line: i + 1, reason };
+        let wrong =
+            |reason: String| DepthEvaluationError::Meta { path: path.to_path_buf(), line: i + 1, reason };
         if line.len() > MOST_LINE_BYTES {
             return Err(wrong(format!("longer than {MOST_LINE_BYTES} bytes")));
         }

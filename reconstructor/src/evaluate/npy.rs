@@ -111,7 +111,14 @@ impl NpyFile {
         if bytes.is_none() {
             return Err(refuse(format!("samples of more than {MOST_SAMPLE_BYTES} bytes")));
         }
-        Ok(Self { path: path.to_path_buf(), file, data_start: 10 + length as u64, samples: *samples, numbers, kind })
+        Ok(Self {
+            path: path.to_path_buf(),
+            file,
+            data_start: 10 + length as u64,
+            samples: *samples,
+            numbers,
+            kind,
+        })
     }
 
     /// How many samples the array says it has.
@@ -162,13 +169,16 @@ impl Header {
         let kind = match after("'descr'").ok_or_else(|| missing("descr"))? {
             value if value.starts_with("'|u1'") => NpyType::U8,
             value if value.starts_with("'<i2'") => NpyType::I16,
-            value => return Err(format!("type {} is not read here", value.chars().take(8).collect::<String>())),
+            value => {
+                return Err(format!("type {} is not read here", value.chars().take(8).collect::<String>()));
+            }
         };
         if !after("'fortran_order'").ok_or_else(|| missing("fortran_order"))?.starts_with("False") {
             return Err("columns come before rows".into());
         }
         let shape = after("'shape'").ok_or_else(|| missing("shape"))?;
-        let inside = shape.strip_prefix('(').and_then(|s| s.split_once(')')).ok_or_else(|| missing("shape"))?.0;
+        let inside =
+            shape.strip_prefix('(').and_then(|s| s.split_once(')')).ok_or_else(|| missing("shape"))?.0;
         let shape = inside
             .split(',')
             .map(str::trim)
@@ -198,7 +208,10 @@ mod tests {
 
     #[test]
     fn samples_are_read_where_they_lie() {
-        let file = array("{'descr': '<i2', 'fortran_order': False, 'shape': (3, 2), }\n", &[1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 1]);
+        let file = array(
+            "{'descr': '<i2', 'fortran_order': False, 'shape': (3, 2), }\n",
+            &[1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 1],
+        );
         let mut npy = NpyFile::open(file.path(), NpyType::I16, &[2]).unwrap();
         assert_eq!((npy.len(), npy.is_empty()), (3, false));
         assert_eq!(npy.sample(2).unwrap(), [5, 0, 6, 1]);

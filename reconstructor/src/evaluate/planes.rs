@@ -63,7 +63,8 @@ pub fn squares(points: &[Point]) -> Squares {
         sum(&|p| (p.pixel.y - y).powi(2)),
         sum(&|p| (p.pixel.x - x) * (p.pixel.y - y)),
     );
-    let (xd, yd) = (sum(&|p| (p.pixel.x - x) * (p.truth_m - truth)), sum(&|p| (p.pixel.y - y) * (p.truth_m - truth)));
+    let (xd, yd) =
+        (sum(&|p| (p.pixel.x - x) * (p.truth_m - truth)), sum(&|p| (p.pixel.y - y) * (p.truth_m - truth)));
     let determinant = xx * yy - xy * xy;
     // Pixels on one line leave one direction open: then the plane is taken along y or x alone.
     let tilt = if determinant > 1e-9 * xx * yy {
