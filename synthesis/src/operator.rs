@@ -16,7 +16,7 @@ pub struct Tripod {
 
 impl Default for Tripod {
     fn default() -> Self {
-        Self { position: DVec3::new(0.0, 17.0, 62.0), player_share: 0.094 }
+        Self { position: DVec3::new(0.0, 17.0, 62.0), player_share: 0.088 }
     }
 }
 

@@ -32,7 +32,7 @@ impl Sensor {
         Self {
             blur_px: 0.5,
             sharpen: 0.35,
-            exposure: 1.05,
+            exposure: 1.18,
             white: [1.0; 3],
             saturation: 1.08,
             noise: 0.008,

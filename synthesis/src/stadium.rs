@@ -367,14 +367,16 @@ impl Stadium {
         }
         let tall = 0.92 + 0.16 * (key(33) - 0.5);
         let shade = 0.75 + 0.5 * key(34);
-        if u.powi(2) + (v - tall * 0.84).powi(2) < 0.0144 {
-            let tone = key(35);
-            return linear([0.78 - 0.4 * tone, 0.60 - 0.35 * tone, 0.50 - 0.32 * tone]) * shade * 0.8;
+        let from_head = Vec2::new(u, v - tall * 0.80);
+        if from_head.length_squared() < 0.0125 {
+            // Hair and hats on top, a face below.
+            if from_head.y > 0.03 {
+                return Vec3::splat(0.02 + 0.10 * key(43).powi(4));
+            }
+            let tone = key(35).powi(2);
+            return linear([0.86 - 0.5 * tone, 0.68 - 0.45 * tone, 0.58 - 0.42 * tone]) * shade;
         }
-        if u.powi(2) + (v - tall * 0.90).powi(2) < 0.0196 {
-            return Vec3::splat(0.025); // hair and hats
-        }
-        let shoulders = 0.24 - 0.9 * (v - tall * 0.60).max(0.0);
+        let shoulders = 0.25 - 1.6 * (v - tall * 0.56).max(0.0);
         if u.abs() < shoulders && v > 0.10 {
             let choice = key(36);
             let coat: Srgb = if choice < 0.42 {
@@ -387,7 +389,7 @@ impl Stadium {
             } else {
                 [0.1 + key(40) * 0.6, 0.1 + key(41) * 0.45, 0.1 + key(42) * 0.45]
             };
-            let fold = 0.8 + 0.2 * (v - 0.16) / 0.6;
+            let fold = 0.45 + 0.35 * (v - 0.10) / 0.6;
             return linear(coat) * shade * fold;
         }
         Vec3::splat(0.022)

@@ -149,7 +149,7 @@ pub fn frame_truth(fixture: &Fixture, scene: &Scene<'_>, frame: usize) -> FrameT
                 .iter()
                 .map(|j| rounded(camera.project(j.as_dvec3()).unwrap_or(DVec2::splat(-1e4)).to_array(), 1))
                 .collect(),
-            joints_m: joints.iter().map(|j| rounded(j.as_dvec3().to_array(), 3)).collect(),
+            joints_m: joints.iter().map(|j| rounded(j.as_dvec3().to_array(), 2)).collect(),
         });
     }
     let ball_m = rounded(fixture.ball[frame].as_dvec3().to_array(), 3);
