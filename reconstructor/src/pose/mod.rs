@@ -211,7 +211,7 @@ impl PoseEstimator {
         if picture.is_empty() || !(square.side >= 1.0) || !square.centre.is_finite() {
             return Ok(None);
         }
-        let seen = self.look(picture, square, detection)?;
+        let seen = self.look_again(picture, square, detection)?;
         let person = person_from(seen, detection, camera, pitch);
         if person.is_none() {
             tracing::trace!(
@@ -225,7 +225,7 @@ impl PoseEstimator {
     }
 
     /// The best of several looks: most people need one, some a second from their hips, a few wider or narrower ones.
-    fn look(
+    fn look_again(
         &mut self,
         picture: &RgbImage,
         square: blazepose::Square,
