@@ -11,9 +11,9 @@ use std::{
 use image::RgbaImage;
 use thiserror::Error;
 use wgpu::{
-    BufferDescriptor, BufferUsages, Device, DeviceDescriptor, Extent3d, Instance, InstanceDescriptor,
-    MapMode, Origin3d, PollType, Queue, RequestAdapterOptions, TexelCopyBufferInfo, TexelCopyBufferLayout,
-    TexelCopyTextureInfo, TextureAspect,
+    Adapter, Backends, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType, Extent3d,
+    Instance, InstanceDescriptor, MapMode, Origin3d, PollType, Queue, RequestAdapterError,
+    RequestAdapterOptions, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
 };
 
 use crate::{
@@ -64,28 +64,41 @@ pub struct Offscreen {
 }
 
 impl Offscreen {
-    /// Opens the first adapter of the machine; a software one will do.
+    /// Opens the machine's preferred adapter; a software one will do.
     pub fn open() -> Result<Self, OffscreenError> {
         wait(async {
-            let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
-            let adapter = instance
-                .request_adapter(&RequestAdapterOptions::default())
-                .await
-                .map_err(|error| OffscreenError::NoAdapter(error.to_string()))?;
-            let name = adapter.get_info().name;
-            let (device, queue) = adapter
-                .request_device(&DeviceDescriptor {
-                    label: Some("offscreen"),
-                    required_limits: adapter.limits(),
-                    ..Default::default()
-                })
-                .await
-                .map_err(|error| OffscreenError::NoDevice {
-                    adapter: name.clone(),
-                    reason: error.to_string(),
-                })?;
-            Ok(Self { device, queue, adapter: name })
+            // OpenGL only when there is nothing better: without a display its loader complains on standard error.
+            let mut adapter = request_adapter(Backends::PRIMARY).await;
+            if adapter.is_err() {
+                adapter = request_adapter(Backends::SECONDARY).await;
+            }
+            Self::on(adapter.map_err(|error| OffscreenError::NoAdapter(error.to_string()))?).await
         })
+    }
+
+    /// Opens a software adapter (Mesa's lavapipe): its pictures are the same to the bit on every machine.
+    pub fn open_software() -> Result<Self, OffscreenError> {
+        wait(async {
+            let adapters = instance(Backends::VULKAN).enumerate_adapters(Backends::VULKAN).await;
+            let software =
+                adapters.into_iter().find(|adapter| adapter.get_info().device_type == DeviceType::Cpu);
+            let missing = || OffscreenError::NoAdapter("no software Vulkan driver".to_owned());
+            Self::on(software.ok_or_else(missing)?).await
+        })
+    }
+
+    async fn on(adapter: Adapter) -> Result<Self, OffscreenError> {
+        let name = adapter.get_info().name;
+        let descriptor = DeviceDescriptor {
+            label: Some("offscreen"),
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = adapter
+            .request_device(&descriptor)
+            .await
+            .map_err(|error| OffscreenError::NoDevice { adapter: name.clone(), reason: error.to_string() })?;
+        Ok(Self { device, queue, adapter: name })
     }
 
     /// A target of the given size.
@@ -175,6 +188,17 @@ impl Offscreen {
         RgbaImage::from_raw(width, height, pixels)
             .ok_or_else(|| OffscreenError::ReadBack("the picture came back with a wrong size".to_owned()))
     }
+}
+
+fn instance(backends: Backends) -> Instance {
+    Instance::new(InstanceDescriptor {
+        backends,
+        ..InstanceDescriptor::new_without_display_handle_from_env()
+    })
+}
+
+async fn request_adapter(backends: Backends) -> Result<Adapter, RequestAdapterError> {
+    instance(backends).request_adapter(&RequestAdapterOptions::default()).await
 }
 
 /// Runs a future on this thread, which sleeps in between: graphics set-up needs no more of a runtime.

@@ -35,20 +35,20 @@ pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: 
     ui.horizontal(|ui| {
         let ready = session.timeline().is_some();
         let playing = session.head().is_playing();
-        if button(ui, ready, "⏮", "First frame").clicked() {
+        if button(ui, ready, "«", "First frame").clicked() {
             session.seek(0, now);
         }
-        if button(ui, ready, "⏪", "Step back").clicked() {
+        if button(ui, ready, "‹", "Step back").clicked() {
             session.step(-1);
         }
-        let (icon, name) = if playing { ("⏸", "Pause") } else { ("▶", "Play") };
-        if button(ui, ready, icon, name).clicked() {
+        let name = if playing { "Pause" } else { "Play" };
+        if button(ui, ready, name, name).clicked() {
             session.toggle(now);
         }
-        if button(ui, ready, "⏩", "Step forward").clicked() {
+        if button(ui, ready, "›", "Step forward").clicked() {
             session.step(1);
         }
-        if button(ui, ready, "⏭", "Last frame").clicked() {
+        if button(ui, ready, "»", "Last frame").clicked() {
             session.seek(u32::MAX, now);
         }
         ui.add_space(8.0);
@@ -73,8 +73,10 @@ fn position(session: &Session) -> String {
     )
 }
 
-fn button(ui: &mut Ui, enabled: bool, icon: &str, name: &str) -> Response {
-    let response = ui.add_enabled(enabled, Button::new(icon).min_size(egui::vec2(30.0, 24.0)));
+fn button(ui: &mut Ui, enabled: bool, face: &str, name: &str) -> Response {
+    // Wide enough for both "Play" and "Pause", so that the row stays where it is.
+    let width = if face == name { 58.0 } else { 30.0 };
+    let response = ui.add_enabled(enabled, Button::new(face).min_size(egui::vec2(width, 24.0)));
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Button, enabled, name));
     response.on_hover_text(name)
 }

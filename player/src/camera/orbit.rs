@@ -36,8 +36,8 @@ impl OrbitCamera {
     pub fn table(pitch: &Pitch, aspect: f64) -> Self {
         let mut orbit = Self {
             target_m: DVec3::ZERO,
-            yaw: 0.34,
-            elevation: 0.62,
+            yaw: 0.24,
+            elevation: 0.60,
             distance_m: 150.0,
             half_pitch_m: DVec2::new(pitch.length_m, pitch.width_m) / 2.0,
         };

@@ -14,10 +14,10 @@ use super::{Atlas, AtlasError, SolidMesh, ball};
 /// Height below which a vertex counts as part of a standing foot, metres.
 const FOOT_HEIGHT_M: f32 = 0.35;
 /// Contact shadows: half size around a foot print, and of somebody in the air, metres.
-const SHADOW_MARGIN_M: f32 = 0.28;
+const SHADOW_MARGIN_M: f32 = 0.34;
 const SHADOW_AIRBORNE_M: f32 = 0.6;
 /// Share of the light that a contact shadow takes in its middle.
-const SHADOW_STRENGTH: f32 = 0.55;
+const SHADOW_STRENGTH: f32 = 0.7;
 /// Shirt of somebody without texture and without known colour: light grey.
 const UNKNOWN_SHIRT: [u8; 3] = [190, 190, 190];
 

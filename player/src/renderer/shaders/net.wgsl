@@ -6,7 +6,7 @@ struct Fragment {
 }
 
 const MESH_M: f32 = 0.12;
-const HALF_THREAD_M: f32 = 0.005;
+const HALF_THREAD_M: f32 = 0.004;
 
 @vertex
 fn vertex(@location(0) position_m: vec3<f32>, @location(1) net_m: vec2<f32>) -> Fragment {
@@ -33,5 +33,5 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
   let u = threads(in.net_m.x, size.x * 1.2);
   let v = threads(in.net_m.y, size.y * 1.2);
   let covered = 1.0 - (1.0 - u) * (1.0 - v);
-  return vec4<f32>(0.86, 0.87, 0.88, covered * 0.9);
+  return vec4<f32>(0.86, 0.87, 0.88, covered * 0.8);
 }

@@ -1,0 +1,105 @@
+//! Pictures of the player on a software adapter, held against the ones in `tests/goldens`.
+//!
+//! Needs a Vulkan driver that runs on the CPU (Debian: mesa-vulkan-drivers). Without one the tests say so and pass,
+//! unless `HOLOPITCH_REQUIRE_TOOLS=1`.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod snapshot;
+
+use image::RgbaImage;
+use player::{
+    camera::{CameraFile, Preset, ViewCamera},
+    offscreen::Offscreen,
+    scene::{FrameScene, Stage},
+};
+use protocol::{chunk::ChunkFrame, limits::Limits, pitch::Pitch, sample};
+use snapshot::{Snapshot, compare};
+
+const SIZE_PX: (u32, u32) = (480, 270);
+const ASPECT: f64 = 480.0 / 270.0;
+const MEAN: f32 = 0.005;
+const WORST_BLOCK: f32 = 0.1;
+
+fn software_adapter() -> Option<Offscreen> {
+    match Offscreen::open_software() {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            let required = std::env::var_os("HOLOPITCH_REQUIRE_TOOLS").is_some_and(|value| value == "1");
+            assert!(!required, "{error}");
+            println!("skipped: {error}");
+            None
+        }
+    }
+}
+
+fn draw(gpu: &Offscreen, frame: &ChunkFrame, camera: &ViewCamera) -> RgbaImage {
+    let scene = FrameScene::new(frame, &[], &Limits::default()).unwrap();
+    gpu.picture(&Stage::new(Pitch::default()), &scene, camera, SIZE_PX).unwrap()
+}
+
+/// Frame 40 of the sample match.
+fn frame() -> ChunkFrame {
+    sample::frame_of(40, 22)
+}
+
+fn preset(preset: Preset) -> ViewCamera {
+    preset.view(&Pitch::default(), frame().camera.as_ref(), ASPECT).unwrap()
+}
+
+#[test]
+fn the_table_from_three_quarters() {
+    let Some(gpu) = software_adapter() else { return };
+    Snapshot::new("table", draw(&gpu, &frame(), &preset(Preset::Table))).matches_within(MEAN, WORST_BLOCK);
+}
+
+#[test]
+fn the_broadcast_cameras_view() {
+    let Some(gpu) = software_adapter() else { return };
+    let drawn = draw(&gpu, &frame(), &preset(Preset::Broadcast));
+    Snapshot::new("broadcast", drawn).matches_within(MEAN, WORST_BLOCK);
+}
+
+#[test]
+fn behind_the_left_goal() {
+    let Some(gpu) = software_adapter() else { return };
+    let drawn = draw(&gpu, &frame(), &preset(Preset::GoalLeft));
+    Snapshot::new("goal-left", drawn).matches_within(MEAN, WORST_BLOCK);
+}
+
+#[test]
+fn two_people_and_the_ball_up_close() {
+    let Some(gpu) = software_adapter() else { return };
+    let ball = frame().ball.unwrap().position_m;
+    let camera = CameraFile::LookAt {
+        position_m: ball + glam::DVec3::new(3.0, 2.4, 7.0),
+        target_m: ball + glam::DVec3::new(-0.6, 0.6, 0.0),
+        vertical_fov_degrees: 26.0,
+    };
+    let drawn = draw(&gpu, &frame(), &camera.view(ASPECT));
+    Snapshot::new("close", drawn).matches_within(MEAN, WORST_BLOCK);
+}
+
+/// The bounds are worth something: a person who is missing, half a metre off, or drawn without their texture shows.
+#[test]
+fn the_bounds_notice_one_person_among_twenty_two() {
+    let Some(gpu) = software_adapter() else { return };
+    let camera = preset(Preset::Broadcast);
+    let right = draw(&gpu, &frame(), &camera);
+    let repeated = compare(&right, &draw(&gpu, &frame(), &camera));
+    assert!(repeated.mean == 0.0, "the same picture twice differs: {repeated:?}");
+    let in_view = frame().bodies.iter().position(|body| body.person.0 == 8).unwrap();
+    let mut missing = frame();
+    missing.bodies.remove(in_view);
+    let mut moved = frame();
+    moved.bodies[in_view].anchor_m.x += 0.5;
+    let mut untextured = frame();
+    untextured.atlas = None;
+    for (what, wrong) in [("missing", missing), ("moved", moved), ("untextured", untextured)] {
+        let difference = compare(&right, &draw(&gpu, &wrong, &camera));
+        assert!(
+            difference.mean > MEAN || difference.worst_block > WORST_BLOCK,
+            "somebody {what} goes unnoticed: {difference:?}"
+        );
+    }
+}
