@@ -1,12 +1,13 @@
-//! One stream being watched: the play head, what is loaded around it, and the frame on show.
+//! One stream being watched: drives the playback state machine, builds the frames it shows and keeps the last good one.
 //!
-//! Owns no clock: the caller says what time it is. A frame that cannot be had leaves the last good one on show.
+//! Owns no clock: the caller says what time it is.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use protocol::{
     chunk::{Chunk, FrameQuality},
     manifest::Manifest,
+    playback::{FailureKind, Playback, PlaybackConfig, PlaybackState, Request, ShownFrame, Speed},
     time::Ticks,
 };
 
@@ -16,25 +17,21 @@ use crate::{
         SourceError,
         loader::{Event, FrameKey, Loader},
     },
-    timeline::{Nanoseconds, PlayHead, Speed, Timeline},
+    timeline::Timeline,
 };
 
 /// Frames built ahead of the play head.
 const FRAMES_AHEAD: usize = 6;
 /// Built frames kept, the ones ahead included.
 const FRAMES_KEPT: usize = 24;
-/// Chunks kept around the play head.
-const CHUNKS_KEPT: usize = 6;
-/// How long to wait before asking a server again that was away.
-const RETRY_AFTER: Nanoseconds = 2_000_000_000;
+/// How long to wait before asking again for a stream, or for a chunk that was given up.
+const RETRY_AFTER: Duration = Duration::from_secs(2);
 
 /// The frame on show.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// Where it lies in the stream.
     pub key: FrameKey,
-    /// When it starts.
-    pub start: Ticks,
     /// Its index in the stream, 0-based.
     pub frame: u32,
     /// How far it can be trusted.
@@ -43,30 +40,25 @@ pub struct Shown {
     pub scene: Arc<FrameScene>,
 }
 
-/// A problem, in words for the person who watches.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Problem {
-    /// What is wrong and what to do.
-    pub message: String,
-    /// When to try again, if that may help.
-    retry_at: Option<Nanoseconds>,
-}
-
 /// A stream being watched.
 pub struct Session {
     loader: Loader,
     manifest: Option<Manifest>,
     timeline: Option<Timeline>,
-    head: PlayHead,
+    playback: Option<Playback>,
+    state: PlaybackState,
+    position: Ticks,
+    /// What the playback asked for and has not got.
+    requests: Vec<Request>,
+    /// Decoded chunks near the one on show.
     chunks: BTreeMap<usize, Arc<Chunk>>,
     frames: BTreeMap<FrameKey, Arc<FrameScene>>,
-    broken: BTreeMap<FrameKey, String>,
-    broken_chunks: BTreeMap<usize, String>,
-    shown: Option<Shown>,
-    problem: Option<Problem>,
-    wanted_chunks: Vec<usize>,
+    broken_frames: BTreeMap<FrameKey, String>,
     wanted_frames: Vec<FrameKey>,
+    shown: Option<Shown>,
     waiting: bool,
+    problem: Option<String>,
+    retry_at: Option<Duration>,
     stalls: u32,
 }
 
@@ -78,16 +70,18 @@ impl Session {
             loader,
             manifest: None,
             timeline: None,
-            head: PlayHead::default(),
+            playback: None,
+            state: PlaybackState::Paused,
+            position: Ticks(0),
+            requests: Vec::new(),
             chunks: BTreeMap::new(),
             frames: BTreeMap::new(),
-            broken: BTreeMap::new(),
-            broken_chunks: BTreeMap::new(),
-            shown: None,
-            problem: None,
-            wanted_chunks: Vec::new(),
+            broken_frames: BTreeMap::new(),
             wanted_frames: Vec::new(),
-            waiting: false,
+            shown: None,
+            waiting: true,
+            problem: None,
+            retry_at: None,
             stalls: 0,
         }
     }
@@ -104,10 +98,22 @@ impl Session {
         self.timeline.as_ref()
     }
 
-    /// The play head.
+    /// Where the play head stands.
     #[must_use]
-    pub fn head(&self) -> &PlayHead {
-        &self.head
+    pub fn position(&self) -> Ticks {
+        self.position
+    }
+
+    /// Whether the match runs, or would if its data were there.
+    #[must_use]
+    pub fn is_playing(&self) -> bool {
+        matches!(self.state, PlaybackState::Playing | PlaybackState::Buffering | PlaybackState::Failed)
+    }
+
+    /// How fast it runs.
+    #[must_use]
+    pub fn speed(&self) -> Speed {
+        self.playback.as_ref().map_or(Speed::NORMAL, Playback::speed)
     }
 
     /// The frame on show; the last good one while another is loading or missing.
@@ -116,10 +122,10 @@ impl Session {
         self.shown.as_ref()
     }
 
-    /// What is wrong at the moment, if anything.
+    /// What is wrong at the moment, if anything, in words.
     #[must_use]
     pub fn problem(&self) -> Option<&str> {
-        self.problem.as_ref().map(|problem| problem.message.as_str())
+        self.problem.as_deref()
     }
 
     /// Whether the frame under the play head is not there yet.
@@ -135,179 +141,183 @@ impl Session {
     }
 
     /// Starts or stops.
-    pub fn toggle(&mut self, now: Nanoseconds) {
-        let Some(timeline) = &self.timeline else { return };
-        if self.head.is_playing() { self.head.pause() } else { self.head.play(timeline, now) }
+    pub fn toggle(&mut self, now: Duration) {
+        let playing = self.is_playing();
+        if let Some(playback) = &mut self.playback {
+            if playing { playback.pause(now) } else { playback.play(now) }
+        }
     }
 
     /// Goes to a frame of the stream, 0-based.
-    pub fn seek(&mut self, frame: u32, now: Nanoseconds) {
-        if let Some(timeline) = &self.timeline {
-            self.head.seek(timeline, frame, now);
+    pub fn seek(&mut self, frame: u32, now: Duration) {
+        if let (Some(playback), Some(timeline)) = (&mut self.playback, &self.timeline) {
+            playback.seek(now, timeline.start_of(frame));
         }
     }
 
     /// Stops and moves by whole frames.
-    pub fn step(&mut self, frames: i64) {
-        if let Some(timeline) = &self.timeline {
-            self.head.step(timeline, frames);
+    pub fn step(&mut self, frames: i32, now: Duration) {
+        let at_end = self.state == PlaybackState::Ended;
+        if let (Some(playback), Some(timeline)) = (&mut self.playback, &self.timeline) {
+            // At its end the playback stands behind the last frame; a step back means the frame before that one.
+            if at_end {
+                playback.seek(now, timeline.start_of(u32::MAX));
+            }
+            playback.step(now, frames);
         }
     }
 
     /// Plays at another speed.
-    pub fn set_speed(&mut self, speed: Speed, now: Nanoseconds) {
-        self.head.set_speed(speed, now);
+    pub fn set_speed(&mut self, speed: Speed, now: Duration) {
+        if let Some(playback) = &mut self.playback {
+            playback.set_speed(now, speed);
+        }
     }
 
-    /// Takes in what was loaded, moves the head, asks for what is needed next. Returns whether another frame is on
+    /// Takes in what was loaded, lets time pass, asks for what is needed next. Returns whether another frame is on
     /// show than before.
-    pub fn update(&mut self, now: Nanoseconds) -> bool {
+    pub fn update(&mut self, now: Duration) -> bool {
         while let Some(event) = self.loader.next_event() {
             self.take(event, now);
         }
-        if let Some(Problem { retry_at: Some(at), .. }) = &self.problem
-            && now >= *at
-        {
-            self.problem = None;
-            self.wanted_chunks.clear();
-            self.loader.retry();
-        }
-        if self.waiting {
-            self.head.hold(now);
-        } else if let Some(timeline) = &self.timeline {
-            self.head.advance(timeline, now);
-        }
-        let changed = self.show();
-        self.ask();
+        self.retry(now);
+        let changed = self.show(now);
+        self.request(now);
         changed
     }
 
-    fn take(&mut self, event: Event, now: Nanoseconds) {
+    /// When to come back although nothing was loaded and nobody did anything; `None` for never.
+    #[must_use]
+    pub fn next_update(&self, now: Duration) -> Option<Duration> {
+        let playback = self.playback.as_ref().and_then(|playback| playback.poll_timeout(now));
+        playback.into_iter().chain(self.retry_at).min().map(|at| at.saturating_sub(now))
+    }
+
+    fn take(&mut self, event: Event, now: Duration) {
         match event {
             Event::Opened(manifest) => {
-                self.problem = None;
+                let best = manifest.representations.len().saturating_sub(1);
+                match Playback::new(&manifest, best, PlaybackConfig::default()) {
+                    Ok(playback) => {
+                        self.playback = Some(playback);
+                        self.problem = None;
+                    }
+                    Err(error) => self.problem = Some(error.to_string()),
+                }
                 self.manifest = Some(*manifest);
             }
-            Event::NotOpened(error) => self.set_problem(&error, now),
-            Event::Chunk { index, result: Ok(chunk), .. } => {
-                self.problem = None;
-                if let (None, Some(manifest), Some(first)) =
-                    (&self.timeline, &self.manifest, chunk.frames.first())
-                {
-                    let (timescale, duration) = (manifest.timescale, manifest.duration);
-                    self.timeline = Some(Timeline { timescale, duration, frame: first.duration });
-                }
-                self.chunks.insert(index, chunk);
+            Event::NotOpened(error) => {
+                self.problem = Some(in_words(&error));
+                self.retry_at = error.is_temporary().then(|| now + RETRY_AFTER);
             }
-            Event::Chunk { index, result: Err(error), .. } => {
-                if !error.is_temporary() {
-                    self.broken_chunks.insert(index, error.to_string());
-                }
-                self.set_problem(&error, now);
-            }
+            Event::Chunk { request, result } => self.take_chunk(request, result, now),
             Event::Frame { key, result: Ok(scene) } => {
                 self.frames.insert(key, scene);
             }
             Event::Frame { key, result: Err(error) } => {
                 tracing::warn!("{error}");
-                self.broken.insert(key, error.to_string());
+                self.broken_frames.insert(key, error.to_string());
             }
         }
     }
 
-    fn set_problem(&mut self, error: &SourceError, now: Nanoseconds) {
-        tracing::warn!("{error}");
-        let (message, retry_at) = if error.is_temporary() {
-            (format!("{error}. The last picture stays; trying again."), Some(now + RETRY_AFTER))
-        } else {
-            (error.to_string(), None)
-        };
-        self.problem = Some(Problem { message, retry_at });
-    }
-
-    /// The chunk under the head.
-    fn chunk_under_head(&self) -> usize {
-        let chunks = self.manifest.as_ref().and_then(|manifest| manifest.representations.last());
-        let position = self.head.position();
-        chunks
-            .map_or(0, |best| best.chunks.partition_point(|chunk| chunk.start <= position).saturating_sub(1))
-    }
-
-    /// The frame under the head, when its chunk is there.
-    fn frame_under_head(&self) -> Option<FrameKey> {
-        let index = self.chunk_under_head();
-        let chunk = self.chunks.get(&index)?;
-        let position = self.head.position();
-        let frame = chunk.frames.partition_point(|frame| frame.start <= position).saturating_sub(1);
-        Some(FrameKey { chunk: index, frame })
-    }
-
-    /// Puts the frame under the head on show, if it is there.
-    fn show(&mut self) -> bool {
-        let was_waiting = self.waiting;
-        let key = self.frame_under_head();
-        let ready = key.and_then(|key| {
-            let scene = self.frames.get(&key)?.clone();
-            let frame = self.chunks.get(&key.chunk)?.frames.get(key.frame)?;
-            Some((key, scene, frame.start, frame.quality))
-        });
-        let broken = key.and_then(|key| self.broken.get(&key));
-        let broken = broken.or_else(|| self.broken_chunks.get(&self.chunk_under_head())).cloned();
-        match (ready, broken) {
-            (Some((key, scene, start, quality)), _) => {
-                self.waiting = false;
-                if self.problem.as_ref().is_some_and(|problem| problem.retry_at.is_none()) {
-                    self.problem = None;
+    fn take_chunk(&mut self, request: Request, result: Result<Arc<Chunk>, SourceError>, now: Duration) {
+        self.requests.retain(|waiting| *waiting != request);
+        let Some(playback) = &mut self.playback else { return };
+        match result {
+            Ok(chunk) => {
+                if let (None, Some(manifest), Some(first)) =
+                    (&self.timeline, &self.manifest, chunk.frames.first())
+                {
+                    let (start, end) = (playback.start(), playback.end());
+                    let (timescale, frame) = (manifest.timescale, first.duration);
+                    self.timeline = Some(Timeline { timescale, start, duration: end - start, frame });
                 }
-                let changed = self.shown.as_ref().map(|shown| shown.key) != Some(key);
-                let frame = self.timeline.map_or(0, |timeline| timeline.frame_at(start));
-                self.shown = Some(Shown { key, start, frame, quality, scene });
-                changed
+                self.chunks.insert(request.chunk, chunk.clone());
+                playback.on_chunk(now, request, chunk);
+                self.problem = None;
             }
-            (None, Some(message)) => {
-                // Nothing to wait for: the last good frame stays and playing goes on past the gap.
-                self.waiting = false;
-                self.problem = Some(Problem { message, retry_at: None });
-                false
-            }
-            (None, None) => {
-                self.waiting = true;
-                if !was_waiting && self.head.is_playing() && self.shown.is_some() {
-                    self.stalls += 1;
+            Err(error) => {
+                tracing::warn!("{error}");
+                let words = in_words(&error);
+                let kind = if error.is_temporary() { FailureKind::Unreachable } else { FailureKind::Corrupt };
+                playback.on_failure(now, request, kind, words.clone());
+                // A server that is away is worth saying at once; a broken chunk only when it is due.
+                if kind == FailureKind::Unreachable {
+                    self.problem = Some(words);
                 }
-                false
             }
         }
     }
 
-    /// Asks for the frames from the head on and for their chunks and the next; forgets what is far away.
-    fn ask(&mut self) {
-        let Some(manifest) = &self.manifest else { return };
-        let count = manifest.representations.last().map_or(0, |best| best.chunks.len());
-        let current = self.chunk_under_head();
-        if self.chunks.len() > CHUNKS_KEPT {
-            self.chunks.retain(|&index, _| index + 2 >= current && index <= current + 2);
+    /// Tries again what was given up because the server was away.
+    fn retry(&mut self, now: Duration) {
+        if self.retry_at.is_some_and(|at| now >= at) {
+            self.retry_at = None;
+            match &mut self.playback {
+                Some(playback) => playback.seek(now, playback.position(now)),
+                None => self.loader.retry(),
+            }
         }
-        let missing = |index: &usize| {
-            *index < count && !self.chunks.contains_key(index) && !self.broken_chunks.contains_key(index)
-        };
-        let away = self.problem.as_ref().is_some_and(|problem| problem.retry_at.is_some());
-        let wanted: Vec<usize> =
-            if away { Vec::new() } else { [current, current + 1].into_iter().filter(missing).collect() };
-        if wanted != self.wanted_chunks {
-            self.loader.want_chunks(&wanted);
-            self.wanted_chunks = wanted;
-        }
+    }
 
-        let Some(head) = self.frame_under_head() else { return };
+    /// Puts the frame under the play head on show, if it is there.
+    fn show(&mut self, now: Duration) -> bool {
+        let Some(playback) = &mut self.playback else { return false };
+        let view = playback.frame(now);
+        (self.state, self.position) = (view.state, view.position);
+        if let Some(failure) = &view.failure {
+            self.problem = Some(failure.message.clone());
+            if failure.kind == FailureKind::Unreachable && self.retry_at.is_none() {
+                self.retry_at = Some(now + RETRY_AFTER);
+            }
+        }
+        let was_waiting = std::mem::replace(&mut self.waiting, view.held && view.failure.is_none());
+        let Some(due) = &view.shown else { return false };
+        let key = FrameKey { chunk: due.chunk_index, frame: due.frame_index };
+        self.want_frames(due);
+        if !view.held {
+            self.problem = self.broken_frames.get(&key).cloned();
+        }
+        let (Some(scene), Some(frame)) = (self.frames.get(&key), due.frame()) else {
+            self.waiting |= !self.broken_frames.contains_key(&key);
+            if self.waiting && !was_waiting && self.is_playing() {
+                self.stalls += 1;
+            }
+            return false;
+        };
+        if self.shown.as_ref().is_some_and(|shown| shown.key == key) {
+            return false;
+        }
+        let index = self.timeline.map_or(0, |timeline| timeline.frame_at(frame.start));
+        self.shown = Some(Shown { key, frame: index, quality: frame.quality, scene: scene.clone() });
+        true
+    }
+
+    /// Hands the playback's requests to the loader.
+    fn request(&mut self, now: Duration) {
+        let Some(playback) = &mut self.playback else { return };
+        let before = self.requests.len();
+        self.requests.extend(std::iter::from_fn(|| playback.poll_request(now)));
+        if self.requests.len() != before {
+            // Answers to requests from before a seek are ignored: they need not be loaded either.
+            let generation = playback.generation();
+            self.requests.retain(|request| request.generation == generation);
+            self.loader.want_chunks(&self.requests);
+        }
+    }
+
+    /// Has the frames from `due` on built, and forgets what is far away.
+    fn want_frames(&mut self, due: &ShownFrame) {
+        let (here, first) = (due.chunk_index, due.frame_index);
+        self.chunks.retain(|&chunk, _| chunk + 1 >= here && chunk <= here + 4);
         let ahead: Vec<FrameKey> = self
             .chunks
-            .range(head.chunk..)
-            .take_while(|(index, _)| **index <= head.chunk + 1)
+            .range(here..=here + 1)
             .flat_map(|(&chunk, content)| {
                 (0..content.frames.len()).map(move |frame| FrameKey { chunk, frame })
             })
-            .skip_while(|key| *key < head)
+            .skip_while(|key| (key.chunk, key.frame) < (here, first))
             .take(FRAMES_AHEAD)
             .collect();
         if self.frames.len() > FRAMES_KEPT {
@@ -315,12 +325,21 @@ impl Session {
         }
         let wanted: Vec<FrameKey> = ahead
             .into_iter()
-            .filter(|key| !self.frames.contains_key(key) && !self.broken.contains_key(key))
+            .filter(|key| !self.frames.contains_key(key) && !self.broken_frames.contains_key(key))
             .collect();
         if wanted != self.wanted_frames {
             let items = wanted.iter().filter_map(|key| Some((*key, self.chunks.get(&key.chunk)?.clone())));
             self.loader.want_frames(items.collect());
             self.wanted_frames = wanted;
         }
+    }
+}
+
+/// What to tell the person who watches.
+fn in_words(error: &SourceError) -> String {
+    if error.is_temporary() {
+        format!("{error}. The last picture stays; trying again.")
+    } else {
+        error.to_string()
     }
 }

@@ -1,21 +1,25 @@
 //! The timeline and the row of buttons. Every control has a name for assistive technology.
 
+use std::time::Duration;
+
 use egui::{Button, ComboBox, Response, Slider, Ui, WidgetInfo};
+
+use protocol::playback::Speed;
 
 use super::Look;
 use crate::{
     camera::Preset,
     session::Session,
-    timeline::{Nanoseconds, Speed},
+    timeline::{SPEEDS_PERCENT, speed_label},
 };
 
 /// The slider over the whole match.
-pub(super) fn timeline(ui: &mut Ui, session: &mut Session, now: Nanoseconds) {
+pub(super) fn timeline(ui: &mut Ui, session: &mut Session, now: Duration) {
     let Some(timeline) = session.timeline().copied() else {
         ui.add_enabled_ui(false, |ui| slider(ui, &mut 0, 0));
         return;
     };
-    let mut frame = timeline.frame_at(session.head().position());
+    let mut frame = timeline.frame_at(session.position());
     if slider(ui, &mut frame, timeline.frames() - 1).changed() {
         session.seek(frame, now);
     }
@@ -31,22 +35,22 @@ fn slider(ui: &mut Ui, frame: &mut u32, last: u32) -> Response {
 }
 
 /// Play, step, speed, camera and where we are.
-pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: Nanoseconds) {
+pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: Duration) {
     ui.horizontal(|ui| {
         let ready = session.timeline().is_some();
-        let playing = session.head().is_playing();
+        let playing = session.is_playing();
         if button(ui, ready, "«", "First frame").clicked() {
             session.seek(0, now);
         }
         if button(ui, ready, "‹", "Step back").clicked() {
-            session.step(-1);
+            session.step(-1, now);
         }
         let name = if playing { "Pause" } else { "Play" };
         if button(ui, ready, name, name).clicked() {
             session.toggle(now);
         }
         if button(ui, ready, "›", "Step forward").clicked() {
-            session.step(1);
+            session.step(1, now);
         }
         if button(ui, ready, "»", "Last frame").clicked() {
             session.seek(u32::MAX, now);
@@ -62,8 +66,8 @@ pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: 
 /// "0:01.23 / 0:10.00 · frame 37 of 300 · clip frame 187"
 fn position(session: &Session) -> String {
     let Some(timeline) = session.timeline() else { return "–".to_owned() };
-    let moment = timeline.label(session.head().position());
-    let length = timeline.label(timeline.duration);
+    let moment = timeline.label(session.position());
+    let length = timeline.label(timeline.start + timeline.duration);
     let Some(shown) = session.shown() else { return format!("{moment} / {length}") };
     format!(
         "{moment} / {length} · frame {} of {} · clip frame {}",
@@ -81,16 +85,17 @@ fn button(ui: &mut Ui, enabled: bool, face: &str, name: &str) -> Response {
     response.on_hover_text(name)
 }
 
-fn speed_menu(ui: &mut Ui, session: &mut Session, now: Nanoseconds) {
-    let speed = session.head().speed();
-    let menu = ComboBox::from_id_salt("speed").width(64.0).selected_text(speed.label()).show_ui(ui, |ui| {
-        for choice in Speed::ALL {
-            if ui.selectable_label(choice == speed, choice.label()).clicked() {
-                session.set_speed(choice, now);
+fn speed_menu(ui: &mut Ui, session: &mut Session, now: Duration) {
+    let speed = session.speed();
+    let menu =
+        ComboBox::from_id_salt("speed").width(64.0).selected_text(speed_label(speed)).show_ui(ui, |ui| {
+            for choice in SPEEDS_PERCENT.map(Speed::percent) {
+                if ui.selectable_label(choice == speed, speed_label(choice)).clicked() {
+                    session.set_speed(choice, now);
+                }
             }
-        }
-    });
-    name_menu(&menu.response, "Speed", &speed.label());
+        });
+    name_menu(&menu.response, "Speed", &speed_label(speed));
 }
 
 fn camera_menu(ui: &mut Ui, look: &mut Look) {

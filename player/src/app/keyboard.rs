@@ -1,13 +1,15 @@
 //! The keys: space plays, arrows step, Home and End go to the ends.
 
+use std::time::Duration;
+
 use egui::{Key, Modifiers, Ui};
 
-use crate::{session::Session, timeline::Nanoseconds};
+use crate::session::Session;
 
 /// Takes the keys out of the input before a focused widget sees them: space would press the last clicked button.
-pub(super) fn apply(ui: &Ui, session: &mut Session, now: Nanoseconds) {
+pub(super) fn apply(ui: &Ui, session: &mut Session, now: Duration) {
     let pressed = |modifiers: Modifiers, key: Key| {
-        ui.input_mut(|input| input.count_and_consume_key(modifiers, key)) as i64
+        ui.input_mut(|input| input.count_and_consume_key(modifiers, key)) as i32
     };
     if pressed(Modifiers::NONE, Key::Space) % 2 == 1 {
         session.toggle(now);
@@ -17,7 +19,7 @@ pub(super) fn apply(ui: &Ui, session: &mut Session, now: Nanoseconds) {
         + pressed(Modifiers::NONE, Key::ArrowRight)
         - pressed(Modifiers::NONE, Key::ArrowLeft);
     if steps != 0 {
-        session.step(steps);
+        session.step(steps, now);
     }
     if pressed(Modifiers::NONE, Key::Home) > 0 {
         session.seek(0, now);

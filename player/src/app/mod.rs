@@ -6,7 +6,7 @@ mod controls;
 mod keyboard;
 mod scene_view;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use egui::{CentralPanel, Color32, Panel, RichText, Ui};
 use protocol::pitch::Pitch;
@@ -15,12 +15,8 @@ use crate::{
     camera::{OrbitCamera, Preset},
     session::Session,
     source::Location,
-    timeline::Nanoseconds,
 };
 use scene_view::SceneView;
-
-/// Asks egui to come back this soon while something is loading or playing.
-const REPAINT: std::time::Duration = std::time::Duration::from_millis(8);
 
 /// How the table is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,14 +58,14 @@ impl PlayerApp {
 
     /// Plays, if it does not already.
     pub fn play(&mut self) {
-        if !self.session.head().is_playing() {
+        if !self.session.is_playing() {
             let now = self.now();
             self.session.toggle(now);
         }
     }
 
-    fn now(&self) -> Nanoseconds {
-        u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX)
+    fn now(&self) -> Duration {
+        self.started.elapsed()
     }
 
     fn pitch(&self) -> Pitch {
@@ -130,10 +126,8 @@ impl eframe::App for PlayerApp {
                 });
             }
         });
-        if self.session.head().is_playing() || self.session.is_waiting() {
-            ui.ctx().request_repaint_after(REPAINT);
-        } else if self.session.problem().is_some() {
-            ui.ctx().request_repaint_after(std::time::Duration::from_millis(500));
+        if let Some(wait) = self.session.next_update(self.now()) {
+            ui.ctx().request_repaint_after(wait);
         }
     }
 }

@@ -109,7 +109,7 @@ impl Script {
             self.last = shown;
             self.shown += 1;
         }
-        let ended = self.shown > 1 && !app.session().head().is_playing();
+        let ended = self.shown > 1 && !app.session().is_playing();
         if self.shown < self.frames && !ended {
             context.request_repaint();
             return;

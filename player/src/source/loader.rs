@@ -9,10 +9,9 @@ use std::{
         mpsc::{self, Receiver, Sender},
     },
     thread,
-    time::Duration,
 };
 
-use protocol::{chunk::Chunk, limits::Limits, manifest::Manifest};
+use protocol::{chunk::Chunk, limits::Limits, manifest::Manifest, playback::Request};
 
 use super::{Location, SourceError, Stream};
 use crate::scene::FrameScene;
@@ -33,14 +32,12 @@ pub enum Event {
     Opened(Box<Manifest>),
     /// The manifest could not be read; nothing more will come until [`Loader::retry`].
     NotOpened(SourceError),
-    /// A chunk is decoded.
+    /// A chunk was asked for.
     Chunk {
-        /// Which.
-        index: usize,
+        /// What was asked.
+        request: Request,
         /// Its content, or why it is not there.
         result: Result<Arc<Chunk>, SourceError>,
-        /// From the request to the decoded chunk.
-        took: Duration,
     },
     /// A frame is ready to be uploaded.
     Frame {
@@ -54,7 +51,7 @@ pub enum Event {
 /// A stream that is being loaded.
 pub struct Loader {
     events: Receiver<Event>,
-    chunks: Arc<Wanted<usize, ()>>,
+    chunks: Arc<Wanted<Request, ()>>,
     frames: Arc<Wanted<FrameKey, Arc<Chunk>>>,
     retries: Arc<Wanted<(), ()>>,
 }
@@ -85,11 +82,10 @@ impl Loader {
                     report.send(Event::NotOpened(SourceError::Start(error)));
                     return;
                 }
-                while let Some((index, ())) = chunks.next() {
-                    let asked = std::time::Instant::now();
-                    let result = runtime.block_on(stream.chunk(index));
+                while let Some((request, ())) = chunks.next() {
+                    let result = runtime.block_on(stream.chunk(request.chunk));
                     let result = result.map(|loaded| Arc::new(loaded.chunk));
-                    report.send(Event::Chunk { index, result, took: asked.elapsed() });
+                    report.send(Event::Chunk { request, result });
                 }
             })
             .map_err(SourceError::Start)?;
@@ -97,8 +93,8 @@ impl Loader {
     }
 
     /// Replaces the list of chunks to load, most urgent first.
-    pub fn want_chunks(&self, wanted: &[usize]) {
-        self.chunks.replace(wanted.iter().map(|&index| (index, ())).collect());
+    pub fn want_chunks(&self, wanted: &[Request]) {
+        self.chunks.replace(wanted.iter().map(|&request| (request, ())).collect());
     }
 
     /// Replaces the list of frames to build, most urgent first.
