@@ -102,7 +102,7 @@ fn while_the_server_is_away_the_last_frame_stays_and_play_resumes_when_it_is_bac
     let location = Location::parse(&server.url()).unwrap();
     let mut session = Session::new(Loader::start(location, Limits::default(), || {}).unwrap());
     let started = Instant::now();
-    let mut wait_for = |session: &mut Session, what: &str, condition: &dyn Fn(&Session) -> bool| {
+    let wait_for = |session: &mut Session, what: &str, condition: &dyn Fn(&Session) -> bool| {
         let until = Instant::now() + Duration::from_secs(30);
         while !condition(session) {
             session.update(started.elapsed());
