@@ -11,6 +11,8 @@ use protocol::{
 use rand::Rng;
 use serde::Serialize;
 
+use crate::props::FLAG_POST_M;
+
 /// The file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correspondences {
@@ -71,6 +73,16 @@ fn candidates(pitch: &Pitch) -> Vec<(String, DVec3)> {
     for (end, sign) in [("left", -1.0), ("right", 1.0)] {
         add(&format!("{end} penalty mark"), sign * (half_x - PENALTY_MARK_M), 0.0, 0.0);
         add(&format!("centre circle, {end}most point"), sign * CIRCLE_RADIUS_M, 0.0, 0.0);
+        let arc = half_x - PENALTY_MARK_M - CIRCLE_RADIUS_M;
+        add(&format!("{end} penalty arc, point nearest to the halfway line"), sign * arc, 0.0, 0.0);
+        for (side, far) in [("far", -1.0), ("near", 1.0)] {
+            add(
+                &format!("{end} {side} corner flag, top of the post"),
+                sign * half_x,
+                FLAG_POST_M,
+                far * half_z,
+            );
+        }
     }
     all
 }

@@ -15,6 +15,7 @@ pub mod dataset;
 pub mod figure;
 pub mod fixture;
 pub mod gait;
+mod landmarks;
 pub mod lettering;
 pub mod motion;
 pub mod movement;
@@ -31,6 +32,7 @@ pub mod render;
 pub mod rig;
 pub mod sensor;
 pub mod stadium;
+mod stands;
 pub mod trajectories;
 pub mod truth;
 

@@ -10,6 +10,9 @@ use crate::{outfit::linear, render::Solid};
 /// Radius of the ball, metres (Law 2).
 pub const BALL_RADIUS_M: f32 = 0.11;
 
+/// Height of a corner flag's post, metres (Law 1: at least 1.5).
+pub const FLAG_POST_M: f64 = 1.5;
+
 fn tube(solid: &mut Solid, from: Vec3, to: Vec3, radius: f32, colour: Vec3) {
     const SIDES: usize = 8;
     let axis = (to - from).normalize_or(Vec3::Y);
@@ -51,7 +54,7 @@ pub fn goals(pitch: &Pitch) -> Solid {
         tube(&mut solid, Vec3::new(x, high, -half - 0.06), Vec3::new(x, high, half + 0.06), 0.06, white);
         for z in [-half_z, half_z] {
             let foot = Vec3::new(x, 0.0, z);
-            tube(&mut solid, foot, foot + Vec3::Y * 1.5, 0.02, linear([0.9, 0.9, 0.2]));
+            tube(&mut solid, foot, foot + Vec3::Y * FLAG_POST_M as f32, 0.02, linear([0.9, 0.9, 0.2]));
             let first = solid.positions.len() as u32;
             for corner in
                 [Vec3::new(0.0, 1.5, 0.0), Vec3::new(0.0, 1.2, 0.0), Vec3::new(-0.42 * side, 1.35, 0.05)]

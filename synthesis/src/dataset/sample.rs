@@ -1,71 +1,25 @@
-//! Training and test pictures for the depth network: one player per crop, with mask, depth offset and joints.
-//!
-//! Every sample is drawn from its own seed, so the same options give the same bytes on any machine and thread count.
-//! `Split` holds out whole actions, bodies and kits.
-
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+//! One sample: a player in front of a camera, rendered, degraded, cropped, with the exact truth of the crop.
 
 use glam::{DVec2, DVec3, Vec3};
 use image::RgbImage;
-use protocol::{camera::Camera, pitch::Pitch};
-use rand::{Rng, SeedableRng};
+use protocol::camera::Camera;
+use rand::Rng;
 use rand_pcg::Pcg64Mcg;
-use rayon::prelude::*;
 use serde::Serialize;
 
+use super::{
+    CROP, DepthOptions, NO_OFFSET, OFFSETS, Split,
+    cast::{Cast, rng},
+};
 use crate::{
     SynthesisError,
-    body::{BaseBody, Build},
-    figure::{Detail, Figure, dress},
     gait::{self, Action},
-    motion::{Motions, Pose},
-    npy,
-    outfit::{Kit, Outfit, Srgb},
-    paint::Lights,
+    motion::Pose,
     raster::Grid,
     render::{Actor, Scene, Window},
     rig::{self, Placement},
     sensor::Sensor,
-    stadium::{Board, Stadium},
 };
-
-/// Side of a crop and of its mask, pixels.
-pub const CROP: usize = 256;
-/// Side of the depth offsets: every second pixel of the crop, at crop pixels 0.5, 2.5, 4.5 …
-pub const OFFSETS: usize = 128;
-/// Marks an offset where the person is not seen.
-pub const NO_OFFSET: i16 = i16::MIN;
-
-/// Which players are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Split {
-    /// For training.
-    Train,
-    /// Actions, bodies and kits that training never sees.
-    Test,
-}
-
-/// What to write.
-#[derive(Clone, Debug)]
-pub struct DepthOptions {
-    /// Folder for the shards; made when missing.
-    pub out: PathBuf,
-    /// Samples in all.
-    pub count: usize,
-    /// Samples per shard.
-    pub shard: usize,
-    /// Everything random follows from it.
-    pub seed: u64,
-    /// Who is drawn.
-    pub split: Split,
-    /// A file with more motions; the shipped ones when absent.
-    pub motions: Option<PathBuf>,
-    /// Height of the players in the picture, pixels: smallest and largest.
-    pub height_px: [f32; 2],
-}
 
 /// One line of `meta.jsonl`.
 #[derive(Clone, Debug, Serialize)]
@@ -128,89 +82,6 @@ pub fn aim(size_px: (u32, u32), focal_px: f64, position: DVec3, target: DVec3, p
     camera
 }
 
-/// Everything a shard draws from.
-struct Cast {
-    figures: Vec<(Figure, u32)>,
-    stadiums: Vec<Stadium>,
-}
-
-impl Cast {
-    fn new(base: &BaseBody, options: &DepthOptions, shard: usize, size: usize) -> Self {
-        let figures = (0..size)
-            .into_par_iter()
-            .map(|k| {
-                let mut rng = rng(options.seed, &[7, shard as u64, k as u64]);
-                // One body in four and one kit in four belong to the test split.
-                let held_out = |id: u32| (id % 4 == 3) == (options.split == Split::Test);
-                let mut pick = |count: u32| loop {
-                    let id = rng.random_range(0..count);
-                    if held_out(id) {
-                        break id;
-                    }
-                };
-                let (body_id, kit_id) = (pick(4000), pick(1200));
-                let build = Build::random(&mut Pcg64Mcg::seed_from_u64(0xB0D1_0000 + u64::from(body_id)));
-                let mut kit_rng = Pcg64Mcg::seed_from_u64(0x5117_0000 + u64::from(kit_id));
-                let kit = Kit::random(&mut kit_rng, format!("kit{kit_id}"));
-                let number = rng.random_bool(0.85).then(|| rng.random_range(1..40));
-                let outfit = Outfit::random(&mut rng, kit, number);
-                (dress(base, base.shape(&build), outfit, Detail::Close), body_id)
-            })
-            .collect();
-        let stadiums = (0..12)
-            .map(|k| {
-                let mut rng = rng(options.seed, &[8, shard as u64, k]);
-                random_stadium(&mut rng)
-            })
-            .collect();
-        Self { figures, stadiums }
-    }
-}
-
-fn random_stadium(rng: &mut Pcg64Mcg) -> Stadium {
-    const TEXTS: [&str; 8] = [
-        "HOLOPITCH",
-        "TABLETOP",
-        "NORTH BANK",
-        "OPEN GOAL",
-        "EXTRA TIME",
-        "FAIR PLAY",
-        "KICK OFF 20",
-        "LINESMAN",
-    ];
-    let mut colour = || -> Srgb { [0; 3].map(|_| rng.random_range(0.02..0.98f32)) };
-    let boards: Vec<Board> =
-        TEXTS.iter().map(|text| Board { text: (*text).into(), ground: colour(), ink: colour() }).collect();
-    let crowd = (0..4).map(|_| colour()).collect();
-    let lights = if rng.random_bool(0.45) {
-        Lights::floodlights()
-    } else {
-        let around = rng.random_range(0.0..std::f32::consts::TAU);
-        let high = rng.random_range(0.45..1.3f32);
-        Lights::sun(
-            Vec3::new(around.cos() * high.cos(), high.sin(), around.sin() * high.cos()),
-            rng.random_range(0.0..1.0),
-        )
-    };
-    let seed = rng.random();
-    let mut stadium = Stadium::new(Pitch::default(), boards, lights, seed);
-    let base = [[0.33, 0.47, 0.16], [0.28, 0.45, 0.20], [0.42, 0.50, 0.22], [0.22, 0.40, 0.17]];
-    let grass: [f32; 3] = base[rng.random_range(0..base.len())];
-    stadium.grass = grass.map(|c| c * rng.random_range(0.9..1.1f32));
-    stadium.mowing = rng.random_range(0.0..0.3);
-    stadium.crowd = crowd;
-    stadium.stands_light = rng.random_range(0.25..0.9);
-    stadium.apron = if rng.random_bool(0.5) { stadium.grass } else { [0.45, 0.25, 0.2] };
-    stadium
-}
-
-fn rng(seed: u64, path: &[u64]) -> Pcg64Mcg {
-    let mix = path.iter().fold(seed ^ 0x9E37_79B9_7F4A_7C15, |state, &step| {
-        (state ^ step.wrapping_mul(0xD6E8_FEB8_6659_FD93)).wrapping_mul(0xA076_1D64_78BD_642F).rotate_left(29)
-    });
-    Pcg64Mcg::seed_from_u64(mix)
-}
-
 fn draw_pose(actions: &[Action<'_>], rng: &mut Pcg64Mcg) -> (String, f32, Pose) {
     let phase = rng.random_range(0.0..1.0);
     let mood = rng.random_range(0.0..1.0);
@@ -224,7 +95,7 @@ fn draw_pose(actions: &[Action<'_>], rng: &mut Pcg64Mcg) -> (String, f32, Pose) 
 }
 
 /// Renders one sample.
-fn sample(
+pub(super) fn draw(
     options: &DepthOptions,
     index: usize,
     cast: &Cast,
@@ -385,94 +256,10 @@ fn enlarge(image: &RgbImage, corner: [f64; 2], scale: f64) -> RgbImage {
     })
 }
 
-/// Writes the shards; `progress` is called with the number of finished samples. A finished shard (its `meta.jsonl` is
-/// written last) is kept when the command runs again.
-pub fn depth_crops(options: &DepthOptions, progress: impl Fn(usize) + Sync) -> Result<(), SynthesisError> {
-    let [low, high] = options.height_px;
-    if options.shard == 0 || options.count == 0 || !(low > 4.0 && high >= low && high < 1000.0) {
-        return Err(SynthesisError::Options(
-            "count, shard size and player heights must be positive and in order".into(),
-        ));
-    }
-    let base = BaseBody::load()?;
-    let motions = match &options.motions {
-        Some(path) => Motions::open(path)?,
-        None => Motions::shipped()?,
-    };
-    let actions = gait::repertoire(&motions, options.split == Split::Test);
-    for (shard, first) in (0..options.count).step_by(options.shard).enumerate() {
-        let folder = options.out.join(format!("shard-{shard:04}"));
-        let last = (first + options.shard).min(options.count);
-        if folder.join("meta.jsonl").exists() {
-            progress(last);
-            continue;
-        }
-        create(&folder)?;
-        let cast = Cast::new(&base, options, shard, (options.shard / 5).clamp(8, 128));
-        let samples: Vec<Sample> = (first..last)
-            .into_par_iter()
-            .map(|index| {
-                let made = sample(options, index, &cast, &actions);
-                progress(index + 1);
-                made
-            })
-            .collect::<Result<_, _>>()?;
-        write_shard(&folder, &samples)?;
-    }
-    Ok(())
-}
-
-fn create(folder: &Path) -> Result<(), SynthesisError> {
-    std::fs::create_dir_all(folder).map_err(|source| SynthesisError::Io {
-        path: folder.to_owned(),
-        doing: "create",
-        source,
-    })
-}
-
-fn write_shard(folder: &Path, samples: &[Sample]) -> Result<(), SynthesisError> {
-    let count = samples.len();
-    let crops: Vec<u8> = samples.iter().flat_map(|s| s.crop.as_raw().iter().copied()).collect();
-    npy::write(&folder.join("crops.npy"), "|u1", &[count, CROP, CROP, 3], &crops)?;
-    let masks: Vec<u8> = samples.iter().flat_map(|s| s.mask.iter().copied()).collect();
-    npy::write(&folder.join("mask.npy"), "|u1", &[count, CROP, CROP], &masks)?;
-    let offsets: Vec<u8> =
-        samples.iter().flat_map(|s| s.offsets_mm.iter().flat_map(|o| o.to_le_bytes())).collect();
-    npy::write(&folder.join("offset_mm.npy"), "<i2", &[count, OFFSETS, OFFSETS], &offsets)?;
-    let mut lines = Vec::new();
-    for sample in samples {
-        serde_json::to_writer(&mut lines, &sample.meta)
-            .map_err(|error| SynthesisError::Options(error.to_string()))?;
-        lines.push(b'\n');
-    }
-    let path = folder.join("meta.jsonl");
-    let written = tempfile_beside(&path).and_then(|(mut file, temporary)| {
-        file.write_all(&lines)?;
-        std::fs::rename(temporary, &path)
-    });
-    written.map_err(|source| SynthesisError::Io { path, doing: "write", source })
-}
-
-fn tempfile_beside(path: &Path) -> std::io::Result<(std::fs::File, PathBuf)> {
-    let temporary = path.with_extension("partial");
-    Ok((std::fs::File::create(&temporary)?, temporary))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn options(out: &Path, split: Split) -> DepthOptions {
-        DepthOptions {
-            out: out.to_owned(),
-            count: 6,
-            shard: 4,
-            seed: 11,
-            split,
-            motions: None,
-            height_px: [40.0, 120.0],
-        }
-    }
+    use crate::{body::BaseBody, motion::Motions};
 
     #[test]
     fn an_aimed_camera_sees_its_target_where_it_should_with_a_level_horizon() {
@@ -488,12 +275,12 @@ mod tests {
     fn offsets_lead_back_to_points_of_a_standing_body() {
         let base = BaseBody::load().unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let options = options(folder.path(), Split::Train);
+        let options = super::super::tests::options(folder.path(), Split::Train);
         let motions = Motions::shipped().unwrap();
         let actions = gait::repertoire(&motions, false);
         let cast = Cast::new(&base, &options, 0, 4);
         for index in 0..4 {
-            let made = sample(&options, index, &cast, &actions).unwrap();
+            let made = draw(&options, index, &cast, &actions).unwrap();
             let (anchor, camera) = (DVec3::from(made.meta.anchor_m), made.meta.camera);
             let [x0, y0, scale] = made.meta.crop;
             let mut seen = 0;
@@ -516,35 +303,6 @@ mod tests {
             }
             let masked = made.mask.iter().filter(|&&m| m > 0).count();
             assert!(seen * 4 > masked * 8 / 10 && masked > 1500, "{seen} offsets for {masked} mask pixels");
-        }
-    }
-
-    #[test]
-    fn a_set_is_the_same_twice_and_its_splits_share_nobody() {
-        let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, split| {
-            let out = folder.path().join(name);
-            depth_crops(&options(&out, split), |_| ()).unwrap();
-            (
-                std::fs::read(out.join("shard-0001/crops.npy")).unwrap(),
-                std::fs::read_to_string(out.join("shard-0001/meta.jsonl")).unwrap(),
-            )
-        };
-        let (first, train) = write("a", Split::Train);
-        assert_eq!(first.len(), 128 + 2 * CROP * CROP * 3);
-        assert_eq!(write("b", Split::Train), (first, train.clone()));
-        let (_, test) = write("c", Split::Test);
-        let names = |text: &str, key: &str| -> Vec<String> {
-            text.lines()
-                .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()[key].to_string())
-                .collect()
-        };
-        for key in ["body", "kit", "motion"] {
-            let held_out = names(&test, key);
-            assert!(
-                names(&train, key).iter().all(|name| !held_out.contains(name)),
-                "{key} is in both splits"
-            );
         }
     }
 }

@@ -1,0 +1,100 @@
+//! Who and what a shard draws from: dressed bodies and stadiums of one split.
+
+use glam::Vec3;
+use protocol::pitch::Pitch;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use super::{DepthOptions, Split};
+use crate::{
+    body::{BaseBody, Build},
+    figure::{Detail, Figure, dress},
+    outfit::{Kit, Outfit, Srgb},
+    paint::Lights,
+    stadium::{Board, Stadium},
+};
+
+/// Everything a shard draws from.
+pub(super) struct Cast {
+    pub(super) figures: Vec<(Figure, u32)>,
+    pub(super) stadiums: Vec<Stadium>,
+}
+
+impl Cast {
+    pub(super) fn new(base: &BaseBody, options: &DepthOptions, shard: usize, size: usize) -> Self {
+        let figures = (0..size)
+            .into_par_iter()
+            .map(|k| {
+                let mut rng = rng(options.seed, &[7, shard as u64, k as u64]);
+                // One body in four and one kit in four belong to the test split.
+                let held_out = |id: u32| (id % 4 == 3) == (options.split == Split::Test);
+                let mut pick = |count: u32| loop {
+                    let id = rng.random_range(0..count);
+                    if held_out(id) {
+                        break id;
+                    }
+                };
+                let (body_id, kit_id) = (pick(4000), pick(1200));
+                let build = Build::random(&mut Pcg64Mcg::seed_from_u64(0xB0D1_0000 + u64::from(body_id)));
+                let mut kit_rng = Pcg64Mcg::seed_from_u64(0x5117_0000 + u64::from(kit_id));
+                let kit = Kit::random(&mut kit_rng, format!("kit{kit_id}"));
+                let number = rng.random_bool(0.85).then(|| rng.random_range(1..40));
+                let outfit = Outfit::random(&mut rng, kit, number);
+                (dress(base, base.shape(&build), outfit, Detail::Close), body_id)
+            })
+            .collect();
+        let stadiums = (0..12)
+            .map(|k| {
+                let mut rng = rng(options.seed, &[8, shard as u64, k]);
+                random_stadium(&mut rng)
+            })
+            .collect();
+        Self { figures, stadiums }
+    }
+}
+
+fn random_stadium(rng: &mut Pcg64Mcg) -> Stadium {
+    const TEXTS: [&str; 8] = [
+        "HOLOPITCH",
+        "TABLETOP",
+        "NORTH BANK",
+        "OPEN GOAL",
+        "EXTRA TIME",
+        "FAIR PLAY",
+        "KICK OFF 20",
+        "LINESMAN",
+    ];
+    let mut colour = || -> Srgb { [0; 3].map(|_| rng.random_range(0.02..0.98f32)) };
+    let boards: Vec<Board> =
+        TEXTS.iter().map(|text| Board { text: (*text).into(), ground: colour(), ink: colour() }).collect();
+    let crowd = (0..4).map(|_| colour()).collect();
+    let lights = if rng.random_bool(0.45) {
+        Lights::floodlights()
+    } else {
+        let around = rng.random_range(0.0..std::f32::consts::TAU);
+        let high = rng.random_range(0.45..1.3f32);
+        Lights::sun(
+            Vec3::new(around.cos() * high.cos(), high.sin(), around.sin() * high.cos()),
+            rng.random_range(0.0..1.0),
+        )
+    };
+    let seed = rng.random();
+    let mut stadium = Stadium::new(Pitch::default(), boards, lights, seed);
+    let base = [[0.33, 0.47, 0.16], [0.28, 0.45, 0.20], [0.42, 0.50, 0.22], [0.22, 0.40, 0.17]];
+    let grass: [f32; 3] = base[rng.random_range(0..base.len())];
+    stadium.grass = grass.map(|c| c * rng.random_range(0.9..1.1f32));
+    stadium.mowing = rng.random_range(0.0..0.3);
+    stadium.crowd = crowd;
+    stadium.stands_light = rng.random_range(0.25..0.9);
+    stadium.apron = if rng.random_bool(0.5) { stadium.grass } else { [0.45, 0.25, 0.2] };
+    stadium
+}
+
+/// The generator of one thing: the seed and the way to it.
+pub(super) fn rng(seed: u64, path: &[u64]) -> Pcg64Mcg {
+    let mix = path.iter().fold(seed ^ 0x9E37_79B9_7F4A_7C15, |state, &step| {
+        (state ^ step.wrapping_mul(0xD6E8_FEB8_6659_FD93)).wrapping_mul(0xA076_1D64_78BD_642F).rotate_left(29)
+    });
+    Pcg64Mcg::seed_from_u64(mix)
+}
