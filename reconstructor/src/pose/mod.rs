@@ -82,8 +82,8 @@ const NARROW: f64 = 0.8;
 const OTHER_LOOKS: [f64; 3] = [0.85, 1.25, 1.6];
 const UNSURE: f32 = 0.5;
 const CLEAR_DETECTION: f32 = 0.35;
-/// Masks that share this part of the smaller one are of the same person if one of them is much shorter: half a body
-/// found again. Two people in a tangle are about the same height.
+/// Masks that share this part of the smaller one are of the same person if one of them is much shorter (half a body
+/// found again) or the necks are one above the other. Two people in a tangle are about the same height, side by side.
 const SAME_MASK: f64 = 0.7;
 const HALF_BODY: f64 = 0.7;
 /// Skeletons nearer than this, on average over the trunk and legs, are the same person, metres.
@@ -364,6 +364,20 @@ mod tests {
         let camera = Camera::looking_at((1280, 720), 2000.0, DVec3::new(0.0, 15.0, 60.0), DVec3::ZERO);
         assert!(same_person(&person(100.0, 0.0), &person(102.0, 1.0), &camera));
         assert!(!same_person(&person(100.0, 0.0), &person(115.0, 0.0), &camera));
+    }
+
+    #[test]
+    fn a_part_of_a_body_found_again_is_the_same_person() {
+        let camera = Camera::looking_at((1280, 720), 2000.0, DVec3::new(0.0, 15.0, 60.0), DVec3::ZERO);
+        let mut legs = person(101.0, 0.0);
+        for joint in &mut legs.joints {
+            joint.pixel.y = 25.0 + joint.pixel.y / 2.0;
+        }
+        legs.mask = Mask { y0: 15, height: 45, coverage: vec![255; 16 * 45], ..legs.mask };
+        legs.bounds.min.y = 15.0;
+        assert!(same_person(&person(100.0, 0.0), &legs, &camera));
+        let neighbour = Person { neck_px: legs.neck_px + DVec2::X * 14.0, ..legs };
+        assert!(!same_person(&person(100.0, 0.0), &neighbour, &camera));
     }
 
     #[test]
