@@ -371,12 +371,15 @@ mod tests {
         let camera = Camera::looking_at((1280, 720), 2000.0, DVec3::new(0.0, 15.0, 60.0), DVec3::ZERO);
         let mut legs = person(101.0, 0.0);
         for joint in &mut legs.joints {
-            joint.pixel.y = 25.0 + joint.pixel.y / 2.0;
+            joint.pixel.y = 45.0 + joint.pixel.y / 4.0;
         }
         legs.mask = Mask { y0: 15, height: 45, coverage: vec![255; 16 * 45], ..legs.mask };
         legs.bounds.min.y = 15.0;
         assert!(same_person(&person(100.0, 0.0), &legs, &camera));
-        let neighbour = Person { neck_px: legs.neck_px + DVec2::X * 14.0, ..legs };
+        let mut neighbour = Person { neck_px: legs.neck_px + DVec2::X * 14.0, ..legs };
+        for joint in &mut neighbour.joints {
+            joint.pixel.x += 14.0;
+        }
         assert!(!same_person(&person(100.0, 0.0), &neighbour, &camera));
     }
 
