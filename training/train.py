@@ -18,7 +18,6 @@ from network import BIN_M, BINS, DepthNetwork, bin_centres, read_out
 from window import GRID, PICTURE_SIZE
 
 BATCH = 8
-PEAK_RATE = 2.5e-3
 WEIGHT_DECAY = 0.02
 BACKGROUND_WEIGHT = 0.3  # few of the background cells are looked at
 ELSEWHERE = 0.05  # share of the cells away from the player that the loss looks at
@@ -108,7 +107,7 @@ def loss_of(classes, offset):
 
 
 @torch.no_grad()
-def validate(network, data, limit=384):
+def validate(network, data, limit):
     """Root mean square of the distance over true player cells, metres; the flat plane's; intersection over union of the mask."""
     network.eval()
     square = flat = cells = both = either = 0.0
@@ -132,6 +131,8 @@ def main():
     parser.add_argument("--out", required=True)
     parser.add_argument("--minutes", type=float, default=40.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rate", type=float, default=2.5e-3, help="highest learning rate")
+    parser.add_argument("--validated", type=int, default=384, help="validation samples looked at for the curve")
     parser.add_argument("--start", help="checkpoint to go on from")
     arguments = parser.parse_args()
 
@@ -147,7 +148,7 @@ def main():
         network.load_state_dict(torch.load(arguments.start))
     average = DepthNetwork().to(memory_format=torch.channels_last)
     average.load_state_dict(network.state_dict())
-    optimizer = torch.optim.AdamW(network.parameters(), PEAK_RATE, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
+    optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
     curve = csv.writer((out / "curve.csv").open("w", newline=""))
     curve.writerow(["seconds", "samples", "loss", "validation_rmse_m", "flat_plane_rmse_m", "validation_mask_iou"])
 
@@ -159,14 +160,14 @@ def main():
         part = elapsed / budget
         if part >= 1.0 or elapsed - reported >= min(90.0, budget / 6):
             reported = elapsed
-            rmse, flat, iou = validate(average, validation)
+            rmse, flat, iou = validate(average, validation, arguments.validated)
             curve.writerow([f"{elapsed:.0f}", seen, f"{running or 0:.4f}", f"{rmse:.4f}", f"{flat:.4f}", f"{iou:.4f}"])
             print(f"{elapsed:.0f} s, {seen} samples, loss {running or 0:.3f}, rmse {rmse:.4f} m (flat {flat:.4f}), mask IoU {iou:.3f}", flush=True)
             torch.save(average.state_dict(), out / "average.pt")
             torch.save(network.state_dict(), out / "network.pt")
         if part >= 1.0:
             break
-        rate = PEAK_RATE * min(1.0, (steps + 1) / 100) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
+        rate = arguments.rate * min(1.0, (steps + 1) / 100) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
         for group in optimizer.param_groups:
             group["lr"] = rate
         if len(order) < BATCH:
