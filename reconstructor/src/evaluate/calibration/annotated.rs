@@ -1,0 +1,180 @@
+//! Annotated broadcast pictures: SoccerNet's pitch keypoints in the YOLO pose format.
+//!
+//! Four annotated points of each picture stand for the correspondences a person gives; the others measure the camera.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use glam::{DVec2, DVec3};
+use image::ImageReader;
+use protocol::pitch::Pitch;
+use rayon::prelude::*;
+use serde::Deserialize;
+
+use super::{
+    CalibrationEvaluationError, CalibrationFigures, FrameErrors, LEAST_POINTS, parse, read,
+    reprojection_errors_px, summary,
+};
+use crate::{
+    calibration::{Calibration, Correspondence, calibrate_pictures},
+    report::Progress,
+};
+
+#[derive(Deserialize)]
+struct NamedPoint {
+    name: String,
+    xyz_m: [f64; 3],
+}
+
+pub(super) fn evaluate(
+    data: &Path,
+    progress: &Progress,
+) -> Result<CalibrationFigures, CalibrationEvaluationError> {
+    let names: BTreeMap<usize, NamedPoint> = parse(&data.join("pitch_points.json"))?;
+    let folder = data.join("labels");
+    let unreadable =
+        |path: &Path, reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
+    let entries = std::fs::read_dir(&folder).map_err(|e| unreadable(&folder, e.to_string()))?;
+    let mut labels: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    labels.sort();
+    let frames: Vec<Option<FrameErrors>> = labels
+        .par_iter()
+        .map(|label| {
+            let frame = annotated_picture(data, label, &names);
+            progress.advance(1);
+            frame
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(summary(&frames.into_iter().flatten().collect::<Vec<_>>()))
+}
+
+/// Errors of one annotated picture; `None` when it has too few points to count.
+fn annotated_picture(
+    data: &Path,
+    label: &Path,
+    names: &BTreeMap<usize, NamedPoint>,
+) -> Result<Option<FrameErrors>, CalibrationEvaluationError> {
+    let stem = label.file_stem().unwrap_or_default();
+    let path = data.join("images").join(stem).with_extension("jpg");
+    let unreadable =
+        |path: &Path, reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
+    let reader = ImageReader::open(&path).map_err(|e| unreadable(&path, e.to_string()))?;
+    let picture = reader.decode().map_err(|e| unreadable(&path, e.to_string()))?.into_rgb8();
+    let text = read(label)?;
+    let points = label_points(&text, names, picture.dimensions());
+    if points.len() < LEAST_POINTS {
+        return Ok(None);
+    }
+    let (given, held_out) = split(&points);
+    let calibration = Calibration { frame: 0, pitch: Pitch::default(), points: given };
+    let estimate = match calibrate_pictures(vec![picture], &calibration) {
+        Ok(estimates) => estimates.into_iter().next().unwrap_or_default(),
+        Err(error) => {
+            tracing::info!(picture = %path.display(), %error, "no camera");
+            return Ok(Some(FrameErrors::default()));
+        }
+    };
+    let Some(camera) = &estimate.camera else { return Ok(Some(FrameErrors::default())) };
+    let pairs = held_out.iter().map(|point| (point.world_m, point.pixel));
+    Ok(Some(FrameErrors {
+        solved: true,
+        errors_px: reprojection_errors_px(camera, pairs),
+        iou: None,
+        line_residual_px: estimate.line_residual_median_px,
+    }))
+}
+
+/// The annotated points of one YOLO pose label: five numbers of the box, then x, y (shares of the picture) and visibility each.
+fn label_points(
+    text: &str,
+    names: &BTreeMap<usize, NamedPoint>,
+    (width, height): (u32, u32),
+) -> Vec<Correspondence> {
+    let numbers: Vec<f64> = text.split_whitespace().skip(5).map_while(|word| word.parse().ok()).collect();
+    let size = DVec2::new(f64::from(width), f64::from(height));
+    let named =
+        numbers.chunks_exact(3).enumerate().filter(|(_, point)| point.get(2).is_some_and(|&v| v > 0.0));
+    named
+        .filter_map(|(index, point)| {
+            let name = names.get(&index)?;
+            // Their world: x along the touchline, y towards the main camera, z up.
+            let [x, y, z] = name.xyz_m;
+            let pixel = DVec2::new(*point.first()?, *point.get(1)?) * size;
+            let inside = pixel.cmpge(DVec2::splat(-0.5)).all() && pixel.cmple(size - 0.5).all();
+            inside.then(|| Correspondence { name: name.name.clone(), pixel, world_m: DVec3::new(x, z, y) })
+        })
+        .collect()
+}
+
+/// The points given to the fit (four of the pitch plane, far apart in the picture) and the others.
+fn split(points: &[Correspondence]) -> (Vec<Correspondence>, Vec<Correspondence>) {
+    let flat: Vec<usize> = (0..points.len()).filter(|&i| points[i].world_m.y == 0.0).collect();
+    let mut chosen: Vec<usize> = Vec::new();
+    // Four whose least triangle is largest keep clear of one line.
+    let mut best = 0.0;
+    for (a, &i) in flat.iter().enumerate() {
+        for (b, &j) in flat.iter().enumerate().skip(a + 1) {
+            for (c, &k) in flat.iter().enumerate().skip(b + 1) {
+                for &l in flat.iter().skip(c + 1) {
+                    let four = [i, j, k, l];
+                    let spread = least_triangle_px2(four.map(|index| points[index].pixel));
+                    if spread > best {
+                        best = spread;
+                        chosen = four.to_vec();
+                    }
+                }
+            }
+        }
+    }
+    let given = chosen.iter().map(|&i| points[i].clone()).collect();
+    let held_out = (0..points.len()).filter(|i| !chosen.contains(i)).map(|i| points[i].clone()).collect();
+    (given, held_out)
+}
+
+/// Area of the smallest of the four triangles that four points make.
+fn least_triangle_px2(p: [DVec2; 4]) -> f64 {
+    let area = |a: DVec2, b: DVec2, c: DVec2| (b - a).perp_dot(c - a).abs() / 2.0;
+    let all =
+        [area(p[0], p[1], p[2]), area(p[0], p[1], p[3]), area(p[0], p[2], p[3]), area(p[1], p[2], p[3])];
+    all.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::camera::Camera;
+
+    use super::{super::pitch_points, *};
+
+    #[test]
+    fn given_points_are_not_measured() {
+        let camera =
+            Camera::looking_at((1920, 1080), 2600.0, DVec3::new(0.0, 18.0, 75.0), DVec3::new(5.0, 0.0, -5.0));
+        let points: Vec<Correspondence> = pitch_points(&Pitch::default())
+            .into_iter()
+            .filter_map(|world_m| {
+                let pixel = camera.project(world_m).filter(|&p| camera.contains(p))?;
+                Some(Correspondence { name: String::new(), pixel, world_m })
+            })
+            .collect();
+        let (given, held_out) = split(&points);
+        assert_eq!((given.len(), given.len() + held_out.len()), (4, points.len()));
+        assert!(held_out.iter().all(|point| !given.contains(point)));
+        let calibration = Calibration { frame: 0, pitch: Pitch::default(), points: given };
+        calibration.check(1920, 1080).unwrap();
+    }
+
+    #[test]
+    fn real_pictures_are_calibrated_from_four_points() {
+        let data =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/calibration/soccernet-keypoints");
+        if !data.exists() {
+            eprintln!("skipped: {} is not here", data.display());
+            return;
+        }
+        let figures = evaluate(&data, &Progress::hidden()).unwrap();
+        assert!(figures.frames > 70, "{figures:?}");
+        assert!(figures.completeness >= 0.85 && figures.reprojection_error_median_px <= 3.0, "{figures:?}");
+    }
+}
