@@ -112,6 +112,19 @@ pub(crate) enum Evaluate {
     /// Depth of rendered players against their true depth.
     #[command(after_help = "Example:\n  reconstructor evaluate depth --data heldout --json depth.json")]
     Depth(EvaluateDepth),
+    /// Cameras against the true ones of a rendered clip, or against annotated pitch points of pictures.
+    #[command(after_help = "Example:\n  reconstructor evaluate calibration --data assets/demo --json calibration.json")]
+    Calibration(EvaluateCalibration),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateCalibration {
+    /// Folder that `synthesize` wrote, or SoccerNet keypoints (`pitch_points.json`, `images/`, `labels/`).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -16,7 +16,7 @@ use protocol::limits::Limits;
 use reconstructor::{
     calibration::command::{self, CalibrateOptions},
     encode::read_stream,
-    evaluate::{depth, matches},
+    evaluate::{self, depth, matches},
     mesh::MeshBudget,
     pipeline::{ReconstructOptions, reconstruct},
     report::{Progress, Reporter},
@@ -57,6 +57,12 @@ fn run(command: Command) -> Result<()> {
         Command::Evaluate(Evaluate::Depth(arguments)) => {
             let progress = Progress::new("depth", 0);
             let figures = depth::depth(&arguments.data, |_| progress.advance(1))?;
+            drop(progress);
+            write_figures(&arguments.json, &figures)
+        }
+        Command::Evaluate(Evaluate::Calibration(arguments)) => {
+            let progress = Progress::new("calibration", 0);
+            let figures = evaluate::calibration::evaluate(&arguments.data, &progress)?;
             drop(progress);
             write_figures(&arguments.json, &figures)
         }
