@@ -42,6 +42,7 @@ pub(super) fn run(arguments: &WindowArguments) -> anyhow::Result<()> {
         screenshot: arguments.screenshot.clone(),
         shown: 0,
         last: None,
+        started: false,
         asked: false,
         picture: Arc::default(),
         outcome: outcome.clone(),
@@ -83,6 +84,7 @@ struct Script {
     screenshot: Option<PathBuf>,
     shown: u32,
     last: Option<u32>,
+    started: bool,
     asked: bool,
     picture: Arc<Mutex<Option<Arc<ColorImage>>>>,
     outcome: Outcome,
@@ -103,7 +105,10 @@ impl Script {
             self.finish(context, Err(anyhow!("{problem}")));
             return;
         }
-        app.play();
+        if !self.started {
+            app.play();
+            self.started = app.session().is_playing();
+        }
         let shown = app.session().shown().map(|shown| shown.scene.clip_frame);
         if shown.is_some() && shown != self.last {
             self.last = shown;
