@@ -324,7 +324,10 @@ fn same_person(a: &Person, b: &Person, camera: &Camera) -> bool {
     let near_px = SAME_SKELETON_M * camera.pixels_per_metre(a.ground_m);
     let (height_a, height_b) = (a.bounds.size().y, b.bounds.size().y);
     let half = height_a.min(height_b) < HALF_BODY * height_a.max(height_b);
-    apart_px < near_px || middles_px < 0.5 * near_px || (half && mask_overlap(&a.mask, &b.mask) > SAME_MASK)
+    let in_line = (a.neck_px.x - b.neck_px.x).abs() < near_px;
+    apart_px < near_px
+        || middles_px < 0.5 * near_px
+        || ((half || in_line) && mask_overlap(&a.mask, &b.mask) > SAME_MASK)
 }
 
 /// Pixels inside both masks as a share of the smaller mask, 0..1.
