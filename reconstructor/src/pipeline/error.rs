@@ -43,6 +43,14 @@ pub enum PipelineError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The folder of the stream cannot be made.
+    #[error("cannot create {} for the stream: {source}; choose another --out", path.display())]
+    Out {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// No frame has a camera.
     #[error(
         "{}: no camera in any of {frames} frames ({reason}); check the calibration points and that the pitch lines are in view",

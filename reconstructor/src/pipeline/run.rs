@@ -18,7 +18,7 @@ use super::{
     work::{Fingerprint, Results, WorkFolder},
 };
 use crate::{
-    calibration::{self, Calibration, CameraEstimate},
+    calibration::{self, Calibration, CalibrationError, CameraEstimate},
     depth::{self, DepthError, DepthEstimator, DepthMap},
     detection::{self, Detection, Detector},
     encode::{StreamFrame, StreamHeader, StreamWriter},
@@ -76,6 +76,19 @@ impl<'a> Run<'a> {
         let calibration = Calibration::read(&options.calibration)?;
         inference::initialize(None)?;
         let clip = Clip::open(&options.clip, options.frames.clone())?;
+        let info = clip.info();
+        calibration.check(info.width_px, info.height_px)?;
+        if !info.frames.iter().any(|frame| frame.clip_frame == calibration.frame) {
+            return Err(CalibrationError::FrameOutside {
+                frame: calibration.frame,
+                start: info.frames.first().map_or(0, |frame| frame.clip_frame),
+                end: info.frames.last().map_or(0, |frame| frame.clip_frame + 1),
+            }
+            .into());
+        }
+        // A folder that cannot be written is known now, not after the long work.
+        std::fs::create_dir_all(&options.out)
+            .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
         let fingerprint = Fingerprint::of_clip(&options.clip).map_err(|source| PipelineError::Work {
             doing: "read",
             path: options.clip.clone(),
