@@ -1,6 +1,7 @@
 //! One stream being watched: drives the playback state machine, builds the frames it shows and keeps the last good one.
 //!
-//! Owns no clock: the caller says what time it is.
+//! Owns no clock: the caller says what time it is. While a due frame is still being built the match's clock stands, so
+//! that a machine too slow for every frame shows fewer of them, and not none.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -46,6 +47,10 @@ pub struct Session {
     manifest: Option<Manifest>,
     timeline: Option<Timeline>,
     playback: Option<Playback>,
+    /// Where the caller's clock stood at the last update, and how far the match's clock is behind it.
+    updated_at: Duration,
+    lag: Duration,
+    building: bool,
     state: PlaybackState,
     position: Ticks,
     /// What the playback asked for and has not got.
@@ -71,6 +76,9 @@ impl Session {
             manifest: None,
             timeline: None,
             playback: None,
+            updated_at: Duration::ZERO,
+            lag: Duration::ZERO,
+            building: false,
             state: PlaybackState::Paused,
             position: Ticks(0),
             requests: Vec::new(),
@@ -142,6 +150,7 @@ impl Session {
 
     /// Starts or stops.
     pub fn toggle(&mut self, now: Duration) {
+        let now = self.match_clock(now);
         let playing = self.is_playing();
         if let Some(playback) = &mut self.playback {
             if playing { playback.pause(now) } else { playback.play(now) }
@@ -150,6 +159,7 @@ impl Session {
 
     /// Goes to a frame of the stream, 0-based.
     pub fn seek(&mut self, frame: u32, now: Duration) {
+        let now = self.match_clock(now);
         if let (Some(playback), Some(timeline)) = (&mut self.playback, &self.timeline) {
             playback.seek(now, timeline.start_of(frame));
         }
@@ -157,6 +167,7 @@ impl Session {
 
     /// Stops and moves by whole frames.
     pub fn step(&mut self, frames: i32, now: Duration) {
+        let now = self.match_clock(now);
         let at_end = self.state == PlaybackState::Ended;
         if let (Some(playback), Some(timeline)) = (&mut self.playback, &self.timeline) {
             // At its end the playback stands behind the last frame; a step back means the frame before that one.
@@ -169,6 +180,7 @@ impl Session {
 
     /// Plays at another speed.
     pub fn set_speed(&mut self, speed: Speed, now: Duration) {
+        let now = self.match_clock(now);
         if let Some(playback) = &mut self.playback {
             playback.set_speed(now, speed);
         }
@@ -177,6 +189,7 @@ impl Session {
     /// Takes in what was loaded, lets time pass, asks for what is needed next. Returns whether another frame is on
     /// show than before.
     pub fn update(&mut self, now: Duration) -> bool {
+        let now = self.match_clock(now);
         while let Some(event) = self.loader.next_event() {
             self.take(event, now);
         }
@@ -189,8 +202,18 @@ impl Session {
     /// When to come back although nothing was loaded and nobody did anything; `None` for never.
     #[must_use]
     pub fn next_update(&self, now: Duration) -> Option<Duration> {
+        let now = now.saturating_sub(self.lag);
         let playback = self.playback.as_ref().and_then(|playback| playback.poll_timeout(now));
         playback.into_iter().chain(self.retry_at).min().map(|at| at.saturating_sub(now))
+    }
+
+    /// The caller's clock without the time that was spent waiting for frames to be built.
+    fn match_clock(&mut self, now: Duration) -> Duration {
+        if self.building {
+            self.lag += now.saturating_sub(self.updated_at);
+        }
+        self.updated_at = self.updated_at.max(now);
+        now.saturating_sub(self.lag)
     }
 
     fn take(&mut self, event: Event, now: Duration) {
@@ -273,6 +296,7 @@ impl Session {
             }
         }
         let was_waiting = std::mem::replace(&mut self.waiting, view.held && view.failure.is_none());
+        self.building = false;
         let Some(due) = &view.shown else { return false };
         let key = FrameKey { chunk: due.chunk_index, frame: due.frame_index };
         self.want_frames(due);
@@ -280,7 +304,8 @@ impl Session {
             self.problem = self.broken_frames.get(&key).cloned();
         }
         let (Some(scene), Some(frame)) = (self.frames.get(&key), due.frame()) else {
-            self.waiting |= !self.broken_frames.contains_key(&key);
+            self.building = !self.broken_frames.contains_key(&key);
+            self.waiting |= self.building;
             if self.waiting && !was_waiting && self.is_playing() {
                 self.stalls += 1;
             }

@@ -126,3 +126,34 @@ fn while_the_server_is_away_the_last_frame_stays_and_play_resumes_when_it_is_bac
     });
     assert_eq!(session.problem(), None);
 }
+
+/// Somebody whose computer draws three pictures a second still sees the match move, from start to end.
+#[test]
+fn a_slow_machine_shows_fewer_frames_and_not_none() {
+    let folder = tempfile::tempdir().unwrap();
+    support::write_match(folder.path(), 90);
+    let location = Location::parse(folder.path().to_str().unwrap()).unwrap();
+    let mut session = Session::new(Loader::start(location, Limits::default(), || {}).unwrap());
+    let until = Instant::now() + Duration::from_secs(30);
+    let mut now = Duration::ZERO;
+    let mut shown = Vec::new();
+    loop {
+        session.update(now);
+        let frame = session.shown().map(|shown| shown.frame);
+        if frame != shown.last().copied() {
+            shown.extend(frame);
+        }
+        if shown.len() == 1 && !session.is_playing() {
+            session.toggle(now);
+        }
+        if shown.last() == Some(&89) {
+            break;
+        }
+        assert!(Instant::now() < until, "frames {shown:?}, then nothing; problem {:?}", session.problem());
+        // The test's clock: a third of a second per picture, whatever the real one says.
+        now += Duration::from_millis(333);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(shown.len() >= 6, "only frames {shown:?} of three seconds were shown");
+    assert!(shown.is_sorted(), "{shown:?}");
+}

@@ -105,16 +105,16 @@ impl Script {
             self.finish(context, Err(anyhow!("{problem}")));
             return;
         }
-        if !self.started {
+        if !self.started && app.session().timeline().is_some() {
             app.play();
-            self.started = app.session().is_playing();
+            self.started = true;
         }
         let shown = app.session().shown().map(|shown| shown.scene.clip_frame);
         if shown.is_some() && shown != self.last {
             self.last = shown;
             self.shown += 1;
         }
-        let ended = self.shown > 1 && !app.session().is_playing();
+        let ended = self.shown > 1 && !app.session().is_playing() && !app.session().is_waiting();
         if self.shown < self.frames && !ended {
             context.request_repaint();
             return;
