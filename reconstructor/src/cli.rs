@@ -113,7 +113,9 @@ pub(crate) enum Evaluate {
     #[command(after_help = "Example:\n  reconstructor evaluate depth --data heldout --json depth.json")]
     Depth(EvaluateDepth),
     /// Cameras against the true ones of a rendered clip, or against annotated pitch points of pictures.
-    #[command(after_help = "Example:\n  reconstructor evaluate calibration --data assets/demo --json calibration.json")]
+    #[command(
+        after_help = "Example:\n  reconstructor evaluate calibration --data assets/demo --json calibration.json"
+    )]
     Calibration(EvaluateCalibration),
 }
 

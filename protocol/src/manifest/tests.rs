@@ -77,7 +77,10 @@ fn paths_cannot_leave_the_stream() {
     let long = "a".repeat(201);
     let result = changed(|document| document["representations"][0]["id"] = long.as_str().into());
     assert!(matches!(result, Err(ManifestError::Path { .. })));
-    assert!(changed(|document| document["representations"][0]["chunks"][0]["path"] = "a/b-2/c_3.glb".into()).is_ok());
+    assert!(
+        changed(|document| document["representations"][0]["chunks"][0]["path"] = "a/b-2/c_3.glb".into())
+            .is_ok()
+    );
 }
 
 #[test]
