@@ -86,10 +86,9 @@ fn energy(
     difference[ROTATION..ROTATION + 3].copy_from_slice(&turn.to_array());
     difference[POSITION..POSITION + 3].copy_from_slice(&travel.to_array());
     difference[RADIAL] = camera.k1 - expected.camera.k1;
-    for parameter in 0..PARAMETERS {
-        let sigma = expected.sigma[parameter];
+    for (parameter, (&sigma, &off)) in expected.sigma.iter().zip(&difference).enumerate() {
         if sigma > 0.0 && sigma.is_finite() {
-            normal.expect(parameter, difference[parameter], sigma);
+            normal.expect(parameter, off, sigma);
         }
     }
     normal

@@ -218,7 +218,7 @@ fn bridge_gaps(mut estimates: Vec<CameraEstimate>) -> Vec<CameraEstimate> {
     for pair in solved.windows(2) {
         let [(before, a), (after, b)] = pair else { continue };
         let gap = after - before;
-        if gap < 2 || gap > LONGEST_GAP {
+        if !(2..=LONGEST_GAP).contains(&gap) {
             continue;
         }
         let turn = turn_between(&a.rotation, &b.rotation);

@@ -169,6 +169,6 @@ fn the_middle_of_a_player_moves_by_less_than_half_a_millimetre() {
         };
         let moved = (mean(&surface.mesh) - mean(&body.mesh)).length();
         assert!(moved < 0.0005, "person {} moved by {moved} m", body.person.0);
-        assert!((surface.anchor_m - DVec3::from(body.anchor_m.as_dvec3())).length() < 1e-6);
+        assert!((surface.anchor_m - body.anchor_m.as_dvec3()).length() < 1e-6);
     }
 }

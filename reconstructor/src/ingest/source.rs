@@ -72,7 +72,7 @@ impl Source {
         let context = codec::Context::from_parameters(stream.parameters()).map_err(unsupported)?;
         let implementation = decoder::find(id).ok_or_else(|| unsupported(ffmpeg::Error::DecoderNotFound))?;
         let mut options = Dictionary::new();
-        options.set("max_pixels", &(u64::from(MAX_SIDE_PX) * u64::from(MAX_SIDE_PX)).to_string());
+        options.set("max_pixels", (u64::from(MAX_SIDE_PX) * u64::from(MAX_SIDE_PX)).to_string());
         // One thread: errors then come with the frame they belong to, and the stages after this one need the cores.
         options.set("threads", "1");
         let decoder = context

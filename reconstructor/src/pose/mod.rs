@@ -163,7 +163,7 @@ impl PoseEstimator {
     /// When the network fails.
     pub fn look(&mut self, picture: &RgbImage, bounds: &PixelBox) -> Result<Option<Look>, PoseError> {
         let square = blazepose::Square::round(bounds);
-        if picture.is_empty() || !(square.side >= 1.0) || !square.centre.is_finite() {
+        if picture.is_empty() || square.side.is_nan() || square.side < 1.0 || !square.centre.is_finite() {
             return Ok(None);
         }
         let seen = blazepose::estimate(&mut self.model, picture, square)?;
@@ -208,7 +208,7 @@ impl PoseEstimator {
         pitch: &Pitch,
     ) -> Result<Option<Person>, PoseError> {
         let square = blazepose::Square::round(&detection.bounds);
-        if picture.is_empty() || !(square.side >= 1.0) || !square.centre.is_finite() {
+        if picture.is_empty() || square.side.is_nan() || square.side < 1.0 || !square.centre.is_finite() {
             return Ok(None);
         }
         let seen = self.look_again(picture, square, detection)?;
@@ -294,11 +294,6 @@ fn person_from(
         ground_m,
         neck_m,
     })
-}
-
-/// Which of two looks at one person to keep: the surer one that shows more of the body.
-fn weight(person: &Person) -> f64 {
-    f64::from(person.pose_score * person.score) * person.bounds.size().y
 }
 
 /// Whether two skeletons, or two masks, are those of one person.
