@@ -89,11 +89,9 @@ impl<'a> Run<'a> {
         // A folder that cannot be written is known now, not after the long work.
         std::fs::create_dir_all(&options.out)
             .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
-        let fingerprint = Fingerprint::of_clip(&options.clip).map_err(|source| PipelineError::Work {
-            doing: "read",
-            path: options.clip.clone(),
-            source,
-        })?;
+        let fingerprint = Fingerprint::of_clip(&options.clip)
+            .map_err(|source| PipelineError::Work { doing: "read", path: options.clip.clone(), source })?
+            .with_program()?;
         let frames: Vec<u8> =
             clip.info().frames.iter().flat_map(|frame| frame.clip_frame.to_le_bytes()).collect();
         let work = WorkFolder::open(options.work.as_deref())?;

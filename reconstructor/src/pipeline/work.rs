@@ -48,11 +48,23 @@ impl Fingerprint {
         self
     }
 
-    /// And of a whole small file, such as a network.
+    /// And of a whole file, such as a network.
     pub(super) fn with_file(self, path: &Path) -> Result<Self, PipelineError> {
-        match fs::read(path) {
-            Ok(bytes) => Ok(self.with(&bytes)),
+        let hash = || -> io::Result<blake3::Hash> {
+            Ok(blake3::Hasher::new().update_reader(fs::File::open(path)?)?.finalize())
+        };
+        match hash() {
+            Ok(hash) => Ok(self.with(hash.as_bytes())),
             Err(source) => Err(PipelineError::Work { doing: "read", path: path.to_owned(), source }),
+        }
+    }
+
+    /// And of this program: another build may compute something else.
+    pub(super) fn with_program(self) -> Result<Self, PipelineError> {
+        match std::env::current_exe() {
+            Ok(program) => self.with_file(&program),
+            // Nowhere to read the program from: the version in the start value must do.
+            Err(_) => Ok(self),
         }
     }
 
