@@ -1,5 +1,8 @@
 //! The shipped clip through every stage, held against its ground truth; and bad input at the front door.
 
+// Tests may panic: that is how they fail.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use std::path::{Path, PathBuf};
 
 use protocol::{chunk::ChunkFrame, limits::Limits};

@@ -1,5 +1,8 @@
 //! Streams that anyone may have written: every way of breaking one ends in a typed error that names the file.
 
+// Tests may panic: that is how they fail.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 use std::{fs, path::Path};
 
 use protocol::{

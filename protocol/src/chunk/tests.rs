@@ -285,7 +285,10 @@ fn strip(rows: u32, bend: f32) -> Mesh {
     mesh
 }
 
-fn any_frame() -> impl Strategy<Value = (u32, i64, i64, Vec<(u32, u32, f32, [f32; 3])>, bool)> {
+/// Clip frame, start, duration, bodies, atlas.
+type AnyFrame = (u32, i64, i64, Vec<(u32, u32, f32, [f32; 3])>, bool);
+
+fn any_frame() -> impl Strategy<Value = AnyFrame> {
     let body = (0..20u32, 2..40u32, -0.5..0.5f32, [-60.0..60.0f32, 0.0..3.0f32, -40.0..40.0f32]);
     (0..100_000u32, 0..3000i64, 1..3000i64, proptest::collection::vec(body, 0..4), any::<bool>())
 }

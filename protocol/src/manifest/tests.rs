@@ -89,7 +89,9 @@ fn impossible_values_are_named() {
     let chunk = |document: &mut Value, index: usize, field: &str, value: Value| {
         document["representations"][0]["chunks"][index][field] = value;
     };
-    let cases: [(&dyn Fn(&mut Value), &str); 12] = [
+    /// How the document is broken, and what the error names.
+    type Case<'a> = (&'a dyn Fn(&mut Value), &'a str);
+    let cases: [Case<'_>; 12] = [
         (&|d| d["timescale"]["numerator"] = 0.into(), "timescale"),
         (&|d| d["timescale"]["denominator"] = 0.into(), "timescale"),
         (&|d| d["duration"] = (-1).into(), "duration"),

@@ -1,6 +1,6 @@
 //! Folders written, overwritten, read back, and disks that refuse.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use image::{Rgb, RgbImage};
 use protocol::{
     chunk::FrameQuality,
