@@ -8,8 +8,10 @@
 mod error;
 mod frames;
 mod kit;
+mod players;
 mod run;
 mod work;
+mod write;
 
 use std::{ops::Range, path::PathBuf};
 
@@ -60,10 +62,10 @@ pub fn reconstruct(
     let people = run.pose(&detections, &cameras)?;
     let tracks = run.track(&people)?;
     let masks = run.segment(&people, &tracks);
-    let masks = run::by_frame(&masks, &tracks, people.len());
+    let masks = players::by_frame(&masks, &tracks, people.len());
     let depths = run.depth(&cameras, &people, &masks)?;
     let paths = run.smooth(&people, &tracks);
-    let figures = run.write(&run::Scene {
+    let figures = run.write(&write::Scene {
         detections: &detections,
         cameras: &cameras,
         people: &people,

@@ -1,0 +1,181 @@
+//! The last stages: meshes, moved onto their paths, into the stream, and the figures of every frame.
+
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
+
+use protocol::{
+    chunk::FrameQuality,
+    manifest::{Person as StreamPerson, PersonId},
+};
+
+use super::{
+    PipelineError,
+    frames::each_frame,
+    players::{Depths, FrameMasks, PersonDepth, of_frame},
+    run::Run,
+};
+use crate::{
+    calibration::CameraEstimate,
+    detection::Detection,
+    encode::{StreamFrame, StreamHeader, StreamWriter},
+    ingest::Clip,
+    mesh::{self, BodySurface},
+    pose::Person,
+    report::{Failure, FrameFigures, Loss, Progress, Stage},
+    tracking::Track,
+    trajectory::{self, Path},
+};
+
+/// All that the last stages need.
+pub(super) struct Scene<'a> {
+    pub(super) detections: &'a [Vec<Detection>],
+    pub(super) cameras: &'a [CameraEstimate],
+    pub(super) people: &'a [Vec<Person>],
+    pub(super) tracks: &'a [Track],
+    pub(super) masks: &'a [FrameMasks<'a>],
+    pub(super) depths: &'a Depths,
+    pub(super) paths: &'a BTreeMap<PersonId, Path>,
+}
+
+impl Run<'_> {
+    /// Meshes, moved onto their paths, to the stream; the figures of every frame.
+    pub(super) fn write(&mut self, scene: &Scene<'_>) -> Result<Vec<FrameFigures>, PipelineError> {
+        let started = Instant::now();
+        let wanted: Vec<bool> = scene.cameras.iter().map(|estimate| estimate.camera.is_some()).collect();
+        let progress = self.reporter.progress(Stage::Mesh, wanted.iter().filter(|wanted| **wanted).count());
+        let mut writing = Writing {
+            writer: StreamWriter::create(&self.options.out, &self.header(scene))?,
+            figures: self.figures(scene),
+            failures: Vec::new(),
+            encode: Duration::ZERO,
+        };
+        let budget = self.options.budget;
+        let read = each_frame(
+            || self.clip.frames(),
+            self.options.threads,
+            &wanted,
+            || Ok(()),
+            |(), frame| {
+                let camera = scene.cameras.get(frame.index).and_then(|estimate| estimate.camera);
+                let depths: BTreeMap<u32, PersonDepth> =
+                    scene.depths.results.load(frame.index).unwrap_or_default();
+                let mut lifted = Vec::new();
+                for (id, found, _) in of_frame(frame.index, scene.masks, scene.people) {
+                    if let (Some(camera), Some((Ok(map), _))) = (&camera, depths.get(&id.0)) {
+                        let body = mesh::lift(&frame.image, camera, id, frame.index, found, map, &budget);
+                        lifted.push((id, body.map_err(|error| error.to_string())));
+                    }
+                }
+                Ok(lifted)
+            },
+            |index, lifted| writing.frame(&self.clip, index, lifted, scene, &progress),
+        )?;
+        drop(progress);
+        self.check_all_read(read, wanted.iter().filter(|wanted| **wanted).count())?;
+        let finishing = Instant::now();
+        let Writing { writer, figures, failures, encode } = writing;
+        writer.finish()?;
+        for failure in failures {
+            self.reporter.note(failure);
+        }
+        let encode = encode + finishing.elapsed();
+        self.reporter.stage_done(Stage::Mesh, started.elapsed().saturating_sub(encode), 0);
+        self.reporter.stage_done(Stage::Encode, encode, 0);
+        Ok(figures)
+    }
+
+    fn header(&self, scene: &Scene<'_>) -> StreamHeader {
+        let people = scene.tracks.iter().map(|track| StreamPerson {
+            id: track.person,
+            team: None,
+            role: None,
+            number: None,
+            shirt_rgb: scene.depths.shirts.get(&track.person).copied(),
+        });
+        StreamHeader {
+            timescale: self.clip.info().timescale,
+            pitch: self.calibration.pitch,
+            people: people.collect(),
+        }
+    }
+
+    /// The figures of every frame, before it is known who has a mesh.
+    fn figures(&self, scene: &Scene<'_>) -> Vec<FrameFigures> {
+        let frames = self.clip.info().frames.iter().enumerate();
+        frames
+            .map(|(index, frame)| {
+                let estimate = scene.cameras.get(index).cloned().unwrap_or_default();
+                let source =
+                    estimate.camera.is_some().then(|| format!("{:?}", estimate.source).to_lowercase());
+                FrameFigures {
+                    frame: frame.clip_frame,
+                    camera_solved: estimate.camera.is_some(),
+                    camera_source: source.unwrap_or_default(),
+                    line_residual_median_px: estimate.line_residual_median_px,
+                    people_detected: scene.detections.get(index).map_or(0, Vec::len),
+                    people_with_mesh: 0,
+                    track_confidence_mean: None,
+                }
+            })
+            .collect()
+    }
+}
+
+/// A stream being written, and what there is to say about it.
+struct Writing {
+    writer: StreamWriter,
+    figures: Vec<FrameFigures>,
+    failures: Vec<Failure>,
+    encode: Duration,
+}
+
+impl Writing {
+    /// Adds one frame.
+    fn frame(
+        &mut self,
+        clip: &Clip,
+        index: usize,
+        lifted: Vec<(PersonId, Result<BodySurface, String>)>,
+        scene: &Scene<'_>,
+        progress: &Progress,
+    ) -> Result<(), PipelineError> {
+        let (Some(time), Some(figures)) = (clip.info().frames.get(index), self.figures.get_mut(index)) else {
+            return Ok(());
+        };
+        let mut surfaces = Vec::new();
+        for (person, body) in lifted {
+            match body {
+                Ok(surface) => surfaces.push(surface),
+                Err(reason) => self.failures.push(Failure {
+                    stage: Stage::Mesh,
+                    loss: Loss::LeftOut,
+                    frame: Some(time.clip_frame),
+                    person: Some(person.0),
+                    reason,
+                }),
+            }
+        }
+        trajectory::place(&mut surfaces, scene.paths);
+        figures.people_with_mesh = surfaces.len();
+        let confidence: f64 = surfaces.iter().map(|surface| f64::from(surface.confidence)).sum();
+        figures.track_confidence_mean = (!surfaces.is_empty()).then(|| confidence / surfaces.len() as f64);
+        let started = Instant::now();
+        self.writer.push_frame(StreamFrame {
+            clip_frame: time.clip_frame,
+            start: time.start,
+            duration: time.duration,
+            camera: scene.cameras.get(index).and_then(|estimate| estimate.camera),
+            quality: FrameQuality {
+                line_residual_px: figures.line_residual_median_px.map(|residual| residual as f32),
+                track_confidence: figures.track_confidence_mean.map(|confidence| confidence as f32),
+            },
+            ball: None,
+            surfaces,
+        })?;
+        self.encode += started.elapsed();
+        progress.advance(1);
+        Ok(())
+    }
+}
