@@ -90,9 +90,10 @@ fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
         threads: arguments.threads.map_or(cores, usize::from),
     };
     let mut reporter = Reporter::new();
-    let report = reconstruct(&options, &mut reporter).with_context(|| match &options.work {
-        Some(work) => format!("not finished; what is done stays in {}", work.display()),
-        None => "not finished; with --work DIR the next run would resume".to_owned(),
+    let report = reconstruct(&options, &mut reporter).inspect_err(|_| {
+        if let Some(work) = options.work.as_ref().filter(|work| work.exists()) {
+            tracing::info!("finished parts stay in {}; the same command resumes", work.display());
+        }
     })?;
     if let Some(path) = &arguments.report {
         write_json(path, &report)?;
@@ -198,7 +199,8 @@ fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {
         let cause = cause.to_string().replace('\n', "; ");
-        if !line.ends_with(&cause) {
+        // Most messages already hold their cause.
+        if !line.contains(&cause) {
             line += if line.is_empty() { "" } else { ": " };
             line += &cause;
         }

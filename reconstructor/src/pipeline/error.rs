@@ -24,6 +24,14 @@ pub enum PipelineError {
     /// No camera.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// The correspondences do not fit the clip.
+    #[error("{}: {source}", path.display())]
+    Correspondences {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with them.
+        source: Box<CalibrationError>,
+    },
     /// The pose network failed.
     #[error(transparent)]
     Pose(#[from] PoseError),
