@@ -9,7 +9,7 @@ import onnxruntime
 
 from window import samples_per_cell
 
-BOX_MARGIN = 1.25
+BOX_MARGIN = 1.5  # as the reconstructor looks at people
 BOX_NOISE = 0.04  # standard deviation of a box edge, of the box's larger side
 INPUT = 256
 POSE_FAILED = 0.1  # below this flag a sample is dropped

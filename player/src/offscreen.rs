@@ -1,13 +1,5 @@
 //! Pictures without a window: finds a graphics adapter, draws, and reads the pixels back.
 
-use std::{
-    future::Future,
-    pin::pin,
-    sync::Arc,
-    task::{Context, Poll, Wake, Waker},
-    thread::{self, Thread},
-};
-
 use image::RgbaImage;
 use thiserror::Error;
 use wgpu::{
@@ -66,7 +58,7 @@ pub struct Offscreen {
 impl Offscreen {
     /// Opens the machine's preferred adapter; a software one will do.
     pub fn open() -> Result<Self, OffscreenError> {
-        wait(async {
+        pollster::block_on(async {
             // OpenGL only when there is nothing better: without a display its loader complains on standard error.
             let mut adapter = request_adapter(Backends::PRIMARY).await;
             if adapter.is_err() {
@@ -78,7 +70,7 @@ impl Offscreen {
 
     /// Opens a software adapter (Mesa's lavapipe): its pictures are the same to the bit on every machine.
     pub fn open_software() -> Result<Self, OffscreenError> {
-        wait(async {
+        pollster::block_on(async {
             let adapters = instance(Backends::VULKAN).enumerate_adapters(Backends::VULKAN).await;
             let software =
                 adapters.into_iter().find(|adapter| adapter.get_info().device_type == DeviceType::Cpu);
@@ -199,23 +191,4 @@ fn instance(backends: Backends) -> Instance {
 
 async fn request_adapter(backends: Backends) -> Result<Adapter, RequestAdapterError> {
     instance(backends).request_adapter(&RequestAdapterOptions::default()).await
-}
-
-/// Runs a future on this thread, which sleeps in between: graphics set-up needs no more of a runtime.
-pub(crate) fn wait<T>(future: impl Future<Output = T>) -> T {
-    struct Unpark(Thread);
-    impl Wake for Unpark {
-        fn wake(self: Arc<Self>) {
-            self.0.unpark();
-        }
-    }
-    let waker = Waker::from(Arc::new(Unpark(thread::current())));
-    let mut context = Context::from_waker(&waker);
-    let mut future = pin!(future);
-    loop {
-        match future.as_mut().poll(&mut context) {
-            Poll::Ready(value) => return value,
-            Poll::Pending => thread::park(),
-        }
-    }
 }

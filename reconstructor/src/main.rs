@@ -98,12 +98,12 @@ fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
     if let Some(path) = &arguments.report {
         write_json(path, &report)?;
     }
-    let residual = report.line_residual_median_px.map_or("no".to_owned(), |px| format!("{px:.2} px"));
     println!(
-        "{}: {} frames, {} cameras, {residual} median line residual, {} people, {:.1} with a mesh per frame, {:.1} s per frame",
+        "{}: {} frames, {} cameras, {} median line residual, {} people, {:.1} with a mesh per frame, {:.1} s per frame",
         options.out.display(),
         report.frames,
         report.cameras_solved,
+        pixels(report.line_residual_median_px),
         report.people,
         report.people_with_mesh_mean,
         report.seconds_per_frame,
@@ -123,12 +123,12 @@ fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
     let report = command::run(&options, &progress)?;
     drop(progress);
     println!(
-        "{}: {} of {} cameras, {:.2} px median line residual, {:.2} px worst frame",
+        "{}: {} of {} cameras, {} median line residual, {} worst frame",
         options.out.display(),
         report.solved,
         report.frames.len(),
-        report.line_residual_median_px,
-        report.line_residual_worst_px,
+        pixels(report.line_residual_median_px),
+        pixels(report.line_residual_worst_px),
     );
     Ok(())
 }
@@ -171,6 +171,11 @@ fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
         .context("the true stream cannot be read; --data names the folder that holds truth/")?;
     let ours = frames(&arguments.stream).context("the reconstructed stream cannot be read")?;
     write_figures(&arguments.json, &matches::compare(&truth, &ours))
+}
+
+/// A distance for people to read.
+fn pixels(distance_px: Option<f64>) -> String {
+    distance_px.map_or("no".to_owned(), |px| format!("{px:.2} px"))
 }
 
 /// Writes figures to a file and to standard output.

@@ -6,9 +6,8 @@ use glam::{DVec2, DVec3, Vec3};
 use protocol::{
     camera::Camera,
     chunk::{self, Ball, Body, Chunk, ChunkFrame, EncodedImage, FrameQuality, ImageFormat},
-    manifest::{
-        ChunkEntry, FILE_NAME, FORMAT, FileEntry, Manifest, Person, PersonId, Representation, VERSION,
-    },
+    hash,
+    manifest::{ChunkEntry, FILE_NAME, FORMAT, Manifest, Person, PersonId, Representation, VERSION},
     mesh::Mesh,
     pitch::Pitch,
     time::{Ticks, Timescale},
@@ -330,7 +329,7 @@ pub fn write_stream(
         let file = chunk::encode(&part, timescale).map_err(|error| broken(error.to_string()))?;
         let path = format!("{name}/{:05}.glb", chunks.len());
         put(&folder.join(&path), &file)?;
-        let entry = FileEntry { path, bytes: file.len() as u64, blake3: protocol::hash::blake3_hex(&file) };
+        let entry = hash::entry(path, &file);
         chunks.push(ChunkEntry { file: entry, start: first, duration: Ticks(length) });
     }
     let people = people_truth(&fixture.members)

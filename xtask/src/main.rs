@@ -33,7 +33,7 @@ enum Command {
     },
     /// Run everything CI runs
     Test,
-    /// Measure decode, upload and draw of the demo stream, and the codecs
+    /// Measure decode, upload, draw and seek of the demo stream
     Bench,
     /// Make a data set under target/datasets
     Dataset {

@@ -112,13 +112,11 @@ struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     fn new(chunk: &'a Chunk, timescale: Timescale, quantisation: Quantisation) -> Self {
-        let mut builder = Builder::default();
-        builder.document.extensions_used = vec![];
         Self {
             chunk,
             timescale,
             quantisation,
-            builder,
+            builder: Builder::default(),
             animation: Animation { name: "match".to_owned(), ..Animation::default() },
             frames: Vec::with_capacity(chunk.frames.len()),
             nodes: BTreeMap::new(),

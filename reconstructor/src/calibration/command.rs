@@ -11,12 +11,12 @@ use protocol::pitch::Pitch;
 use serde::Serialize;
 
 use super::{
-    Calibration, CalibrationError, CameraEstimate, calibrate, calibrate_pictures, overlay, sequence::median,
+    Calibration, CalibrationError, CameraEstimate, calibrate, calibrate_pictures, overlay,
     soccernet::SoccerNetCamera,
 };
 use crate::{
     ingest::{Clip, MAX_SIDE_PX},
-    report::Progress,
+    report::{Progress, median},
 };
 
 /// Bytes that decoding one picture may take.
@@ -44,10 +44,10 @@ pub struct CalibrationReport {
     pub pitch: Pitch,
     /// Frames with a camera.
     pub solved: usize,
-    /// Median over the frames of their median line distance, pixels.
-    pub line_residual_median_px: f64,
+    /// Median over the frames of their median line distance, pixels; `None` when no frame has lines.
+    pub line_residual_median_px: Option<f64>,
     /// Greatest of the frames' median line distances, pixels.
-    pub line_residual_worst_px: f64,
+    pub line_residual_worst_px: Option<f64>,
     /// One entry per frame.
     pub frames: Vec<FrameCamera>,
 }
@@ -100,8 +100,8 @@ pub fn run(options: &CalibrateOptions, progress: &Progress) -> Result<Calibratio
     let report = CalibrationReport {
         pitch: given.pitch,
         solved: estimates.iter().filter(|e| e.camera.is_some()).count(),
-        line_residual_worst_px: residuals.iter().copied().fold(0.0, f64::max),
-        line_residual_median_px: median(residuals),
+        line_residual_worst_px: residuals.iter().copied().max_by(f64::total_cmp),
+        line_residual_median_px: median(&residuals),
         frames: frames
             .into_iter()
             .zip(estimates)

@@ -31,7 +31,7 @@ pub use input::{Calibration, Correspondence};
 use crate::{
     detection::Detection,
     geometry::PixelBox,
-    ingest::{Clip, Frame, IngestError},
+    ingest::{Clip, ClipInfo, Frame, IngestError},
     report::Progress,
 };
 use lines::LinePixels;
@@ -89,13 +89,7 @@ pub fn calibrate(
     progress: &Progress,
 ) -> Result<Vec<CameraEstimate>, CalibrationError> {
     let info = clip.info();
-    let start = info.frames.iter().position(|frame| frame.clip_frame == first.frame).ok_or_else(|| {
-        CalibrationError::FrameOutside {
-            frame: first.frame,
-            start: info.frames.first().map_or(0, |frame| frame.clip_frame),
-            end: info.frames.last().map_or(0, |frame| frame.clip_frame + 1),
-        }
-    })?;
+    let start = start_in(info, first)?;
     if !people.is_empty() && people.len() != info.frames.len() {
         return Err(CalibrationError::PeopleMismatch { people: people.len(), frames: info.frames.len() });
     }
@@ -103,6 +97,17 @@ pub fn calibrate(
     let camera = initial::camera(first, (info.width_px, info.height_px))?;
     let frames = find_lines(clip.frames()?, people, &|| progress.advance(1))?;
     solve(&frames, start, &camera, first)
+}
+
+/// Where in the range the frame of the correspondences is.
+pub(crate) fn start_in(info: &ClipInfo, first: &Calibration) -> Result<usize, CalibrationError> {
+    info.frames.iter().position(|frame| frame.clip_frame == first.frame).ok_or_else(|| {
+        CalibrationError::FrameOutside {
+            frame: first.frame,
+            start: info.frames.first().map_or(0, |frame| frame.clip_frame),
+            end: info.frames.last().map_or(0, |frame| frame.clip_frame + 1),
+        }
+    })
 }
 
 /// The cameras of pictures of one shot, in order; `first.frame` counts from 0 in `pictures`.

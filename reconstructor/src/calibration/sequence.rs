@@ -12,7 +12,7 @@ use super::{
     template::{Sample, visible},
     tripod::{View, common, placed_at},
 };
-use crate::geometry::PixelBox;
+use crate::{geometry::PixelBox, report::median};
 
 /// Fewer visible line points than this do not fix a camera.
 pub(super) const LEAST_POINTS: usize = 25;
@@ -111,7 +111,7 @@ impl Motion {
         // The lens of a camera may start or stop turning at any frame: also try standing still.
         let mut estimate = self.attempt(&steady, frame, samples, &map);
         if estimate.camera.is_none() {
-            let still = self.attempt(&self.last.clone(), frame, samples, &map);
+            let still = self.attempt(&self.last, frame, samples, &map);
             if still.camera.is_some() {
                 estimate = still;
             }
@@ -176,7 +176,10 @@ fn on_tripod(frames: &[FrameLines], alone: Vec<CameraEstimate>, samples: &[Sampl
             Some(View { camera: estimate.camera?, people: &frame.people, map: frame.lines.map() })
         })
         .collect();
-    let middle = |of: &dyn Fn(&Camera) -> f64| median(views.iter().map(|view| of(&view.camera)).collect());
+    let middle = |of: &dyn Fn(&Camera) -> f64| {
+        let values: Vec<f64> = views.iter().map(|view| of(&view.camera)).collect();
+        median(&values).unwrap_or_default() // there are views
+    };
     let start = DVec3::new(middle(&|c| c.position.x), middle(&|c| c.position.y), middle(&|c| c.position.z));
     let (position, k1) = common(&views, samples, start, middle(&|c| c.k1));
     drop(views);
@@ -194,8 +197,10 @@ fn on_tripod(frames: &[FrameLines], alone: Vec<CameraEstimate>, samples: &[Sampl
             judge(&fitted, frame, samples, &map)
         })
         .collect();
-    let overall =
-        |all: &[CameraEstimate]| median(all.iter().filter_map(|e| e.line_residual_median_px).collect());
+    let overall = |all: &[CameraEstimate]| {
+        let residuals: Vec<f64> = all.iter().filter_map(|e| e.line_residual_median_px).collect();
+        median(&residuals).unwrap_or(f64::INFINITY)
+    };
     let (before, after) = (overall(&alone), overall(&together));
     let solved_together = together.iter().filter(|e| e.camera.is_some()).count();
     tracing::info!(%position, k1, free_px = before, tripod_px = after, "one position for all frames");
@@ -239,10 +244,4 @@ fn bridge_gaps(mut estimates: Vec<CameraEstimate>) -> Vec<CameraEstimate> {
         }
     }
     estimates
-}
-
-/// Middle value; 0 of nothing.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

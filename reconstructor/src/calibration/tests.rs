@@ -7,6 +7,7 @@ use image::Rgb;
 use protocol::pitch::{LINE_WIDTH_M, Marking, Pitch};
 
 use super::*;
+use crate::report::median;
 
 const SIZE: (u32, u32) = (960, 540);
 
@@ -119,7 +120,7 @@ fn frames_without_lines_are_bridged_and_said_to_be() {
     let estimates = calibrate_pictures(pictures, &by_hand(&cameras[0], 0)).unwrap();
     assert_eq!(estimates[3].source, CameraSource::Predicted);
     assert!(estimates[3].reason.is_some());
-    let error = sequence::median(reprojection(&cameras[3], &estimates[3].camera.unwrap()));
+    let error = median(&reprojection(&cameras[3], &estimates[3].camera.unwrap())).unwrap();
     assert!(error < 2.0, "{error}");
     assert!([0, 1, 2, 4, 5, 6].iter().all(|&i| estimates[i].source == CameraSource::Lines));
 }

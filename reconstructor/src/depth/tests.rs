@@ -66,11 +66,7 @@ fn window_picture_and_painted_pose_are_the_trainers() {
 }
 
 fn estimator() -> Option<DepthEstimator> {
-    if let Err(reason) = inference::initialize(None) {
-        eprintln!("skipped: {reason}");
-        return None;
-    }
-    Some(DepthEstimator::load().unwrap())
+    inference::ready().then(|| DepthEstimator::load().unwrap())
 }
 
 #[test]

@@ -3,10 +3,13 @@
 use glam::DVec2;
 use image::RgbImage;
 
-use crate::{geometry::Mask, pose::Person};
+use crate::{
+    geometry::Mask,
+    pose::{Person, index},
+};
 
-/// BlazePose: shoulders and hips.
-const TORSO: [usize; 4] = [11, 12, 24, 23];
+/// The corners of the torso, round it.
+const TORSO: [usize; 4] = [index::LEFT_SHOULDER, index::RIGHT_SHOULDER, index::RIGHT_HIP, index::LEFT_HIP];
 /// Samples across and down the torso.
 const GRID: usize = 8;
 /// Fewer samples inside the mask than this say nothing.

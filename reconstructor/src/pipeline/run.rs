@@ -11,10 +11,10 @@ use super::{
     work::{Fingerprint, Results, WorkFolder},
 };
 use crate::{
-    calibration::{self, Calibration, CalibrationError, CameraEstimate},
+    calibration::{self, Calibration, CameraEstimate},
     detection::{self, Detection, Detector},
     inference,
-    ingest::{Clip, ClipInfo, Frame},
+    ingest::{Clip, Frame},
     pose::{self, Person, PoseEstimator},
     report::{Failure, FrameFigures, Loss, ReconstructReport, Reporter, Stage},
 };
@@ -41,10 +41,13 @@ impl<'a> Run<'a> {
         inference::initialize(None)?;
         let clip = Clip::open(&options.clip, options.frames.clone())?;
         let info = clip.info();
-        check(&calibration, info).map_err(|source| PipelineError::Correspondences {
-            path: options.calibration.clone(),
-            source: Box::new(source),
-        })?;
+        calibration
+            .check(info.width_px, info.height_px)
+            .and_then(|()| calibration::start_in(info, &calibration))
+            .map_err(|source| PipelineError::Correspondences {
+                path: options.calibration.clone(),
+                source: Box::new(source),
+            })?;
         // A folder that cannot be written is known now, not after the long work.
         std::fs::create_dir_all(&options.out)
             .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
@@ -217,17 +220,4 @@ impl<'a> Run<'a> {
     pub(super) fn finish(self, figures: Vec<FrameFigures>, people: usize) -> ReconstructReport {
         self.reporter.finish(figures, people)
     }
-}
-
-/// Whether the correspondences can be used with this clip and range.
-fn check(calibration: &Calibration, info: &ClipInfo) -> Result<(), CalibrationError> {
-    calibration.check(info.width_px, info.height_px)?;
-    if info.frames.iter().any(|frame| frame.clip_frame == calibration.frame) {
-        return Ok(());
-    }
-    Err(CalibrationError::FrameOutside {
-        frame: calibration.frame,
-        start: info.frames.first().map_or(0, |frame| frame.clip_frame),
-        end: info.frames.last().map_or(0, |frame| frame.clip_frame + 1),
-    })
 }

@@ -63,8 +63,10 @@ impl Fingerprint {
     pub(super) fn with_program(self) -> Result<Self, PipelineError> {
         match std::env::current_exe() {
             Ok(program) => self.with_file(&program),
-            // Nowhere to read the program from: the version in the start value must do.
-            Err(_) => Ok(self),
+            Err(error) => {
+                tracing::warn!("{error}: results of other builds of this version may be resumed");
+                Ok(self)
+            }
         }
     }
 

@@ -31,9 +31,10 @@ pub(super) struct Square {
 }
 
 impl Square {
-    /// The square the network wants for a person's box.
-    pub(super) fn round(bounds: &PixelBox) -> Self {
-        Self { centre: bounds.centre(), side: MARGIN * bounds.size().max_element() }
+    /// The square the network wants for a person's box; `None` when the box is empty or not a number.
+    pub(super) fn round(bounds: &PixelBox) -> Option<Self> {
+        let square = Self { centre: bounds.centre(), side: MARGIN * bounds.size().max_element() };
+        (square.side >= 1.0 && square.centre.is_finite()).then_some(square)
     }
 
     /// From pixels of the square (corner of the first pixel at 0) to pixels of the clip.
@@ -192,7 +193,8 @@ mod tests {
 
     #[test]
     fn the_square_is_half_as_large_again_as_the_box() {
-        let square = Square::round(&PixelBox { min: DVec2::new(10.0, 20.0), max: DVec2::new(30.0, 100.0) });
+        let bounds = PixelBox { min: DVec2::new(10.0, 20.0), max: DVec2::new(30.0, 100.0) };
+        let square = Square::round(&bounds).unwrap();
         assert_eq!(square, Square { centre: DVec2::new(20.0, 60.0), side: 120.0 });
         assert_eq!(square.to_clip(128.0, 128.0), square.centre);
         assert_eq!(square.to_clip(0.0, 256.0), DVec2::new(-40.0, 120.0));

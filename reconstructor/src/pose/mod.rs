@@ -162,10 +162,9 @@ impl PoseEstimator {
     /// # Errors
     /// When the network fails.
     pub fn look(&mut self, picture: &RgbImage, bounds: &PixelBox) -> Result<Option<Look>, PoseError> {
-        let square = blazepose::Square::round(bounds);
-        if picture.is_empty() || square.side.is_nan() || square.side < 1.0 || !square.centre.is_finite() {
+        let Some(square) = blazepose::Square::round(bounds).filter(|_| !picture.is_empty()) else {
             return Ok(None);
-        }
+        };
         let seen = blazepose::estimate(&mut self.model, picture, square)?;
         let mask = silhouette::clean(&seen.mask, &seen.joints);
         Ok(Some(Look { joints: seen.joints, mask, score: seen.score }))
@@ -207,10 +206,8 @@ impl PoseEstimator {
         camera: &Camera,
         pitch: &Pitch,
     ) -> Result<Option<Person>, PoseError> {
-        let square = blazepose::Square::round(&detection.bounds);
-        if picture.is_empty() || square.side.is_nan() || square.side < 1.0 || !square.centre.is_finite() {
-            return Ok(None);
-        }
+        let square = blazepose::Square::round(&detection.bounds).filter(|_| !picture.is_empty());
+        let Some(square) = square else { return Ok(None) };
         let seen = self.look_again(picture, square, detection)?;
         let person = person_from(seen, detection, camera, pitch);
         if person.is_none() {

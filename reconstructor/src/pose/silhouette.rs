@@ -1,6 +1,8 @@
 //! Cleans an instance mask: what is not connected to the skeleton is somebody else, a line, or noise.
 
 use glam::DVec2;
+use image::{GrayImage, Luma};
+use imageproc::region_labelling::{Connectivity, connected_components};
 
 use super::{Joint, index};
 use crate::geometry::{Mask, PixelBox};
@@ -74,33 +76,17 @@ pub(super) fn clean(mask: &Mask, joints: &[Joint]) -> Mask {
 
 /// Connected pieces of the inside pixels (8 neighbours): a label per pixel, and the area of each piece.
 fn pieces(mask: &Mask) -> (Vec<Option<usize>>, Vec<usize>) {
-    let (width, height) = (mask.width as usize, mask.height as usize);
-    let inside = |i: usize| mask.coverage.get(i).is_some_and(|&c| c >= INSIDE);
-    let mut labels = vec![None; width * height];
-    let mut areas = Vec::new();
-    let mut open = Vec::new();
-    for start in 0..width * height {
-        if !inside(start) || labels[start].is_some() {
-            continue;
-        }
-        let label = areas.len();
-        let mut area = 0;
-        labels[start] = Some(label);
-        open.push(start);
-        while let Some(pixel) = open.pop() {
-            area += 1;
-            let (x, y) = (pixel % width, pixel / width);
-            for v in y.saturating_sub(1)..=(y + 1).min(height - 1) {
-                for u in x.saturating_sub(1)..=(x + 1).min(width - 1) {
-                    let next = v * width + u;
-                    if inside(next) && labels[next].is_none() {
-                        labels[next] = Some(label);
-                        open.push(next);
-                    }
-                }
-            }
-        }
-        areas.push(area);
+    let inside = mask.coverage.iter().map(|&coverage| u8::from(coverage >= INSIDE)).collect();
+    let Some(inside) = GrayImage::from_raw(mask.width, mask.height, inside) else {
+        return Default::default();
+    };
+    let labels = connected_components(&inside, Connectivity::Eight, Luma([0]));
+    // The library counts from 1 and gives 0 to the background.
+    let labels: Vec<Option<usize>> =
+        labels.pixels().map(|label| (label.0[0] as usize).checked_sub(1)).collect();
+    let mut areas = vec![0; labels.iter().flatten().max().map_or(0, |last| last + 1)];
+    for &label in labels.iter().flatten() {
+        areas[label] += 1;
     }
     (labels, areas)
 }

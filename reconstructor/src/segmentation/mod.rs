@@ -3,8 +3,6 @@
 //! A [`Segmenter`] decides for one track at a time and may look at everybody in every frame. The one here takes the
 //! pose network's instance mask and gives pixels that two people claim to one of them.
 
-use std::collections::HashMap;
-
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -59,7 +57,8 @@ fn own_pixels<'a>(person: &Person, others: impl Iterator<Item = &'a Person>) -> 
     let own = &person.mask;
     let width = own.width.max(1) as usize;
     let person_claim = Claim::of(person);
-    let mut lost: HashMap<usize, ()> = HashMap::new();
+    let mut mask = own.clone();
+    let mut lost = false;
     for other in others.filter(|other| touch(own, &other.mask)) {
         let other_claim = Claim::of(other);
         for (i, &coverage) in own.coverage.iter().enumerate() {
@@ -70,20 +69,12 @@ fn own_pixels<'a>(person: &Person, others: impl Iterator<Item = &'a Person>) -> 
             }
             let pixel = DVec2::new(f64::from(x), f64::from(y));
             if other_claim.strength(pixel, rival) > person_claim.strength(pixel, coverage) {
-                lost.insert(i, ());
+                mask.coverage[i] = 0;
+                lost = true;
             }
         }
     }
-    if lost.is_empty() {
-        return own.clone();
-    }
-    let mut mask = own.clone();
-    for (i, coverage) in mask.coverage.iter_mut().enumerate() {
-        if lost.contains_key(&i) {
-            *coverage = 0;
-        }
-    }
-    cut(&mask)
+    if lost { cut(&mask) } else { mask }
 }
 
 fn touch(a: &Mask, b: &Mask) -> bool {
