@@ -21,7 +21,8 @@ BATCH = 8
 WEIGHT_DECAY = 0.02
 BACKGROUND_WEIGHT = 0.3  # few of the background cells are looked at
 ELSEWHERE = 0.05  # share of the cells away from the player that the loss looks at
-DISTANCE_WEIGHT = 6.0  # of the mean distance in metres beside the cross entropy
+DISTANCE_WEIGHT = 3.0  # of the read-out's mean error in metres beside the cross entropy
+SQUARE_M = 0.1  # errors beyond this count by their square: where front and back cannot be told, the middle is best
 AVERAGE = 0.995
 
 
@@ -102,8 +103,8 @@ def loss_of(classes, offset):
     weights = torch.where(player, 1.0, BACKGROUND_WEIGHT)
     entropy = (torch.where(player, near, -logs[:, 0]) * weights).sum() / weights.sum()
     depth = torch.softmax(classes[player][:, 1:], 1) @ bin_centres()
-    distance = (depth - (place[player] - BINS // 2) * BIN_M).abs().mean()
-    return entropy + DISTANCE_WEIGHT * distance
+    error = depth - (place[player] - BINS // 2) * BIN_M
+    return entropy + DISTANCE_WEIGHT * (error.abs() + error.square() / SQUARE_M).mean()
 
 
 @torch.no_grad()

@@ -7,6 +7,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod camera;
+pub mod placement;
 pub mod renderer;
 pub mod scene;
 pub mod timeline;

@@ -148,13 +148,13 @@ pub(super) fn draw(
     let joints = actors[0].posed.landmarks.clone();
     let scene = Scene { stadium, actors, solids: Vec::new() };
 
-    // The crop: the box of the whole person, hidden parts too, made square and a quarter larger.
+    // The crop: the box of the whole person, hidden parts too, made square and wide enough for the pose network.s look (1.5 times the box).
     let (mut least, mut most) = (DVec2::MAX, DVec2::MIN);
     for pixel in scene.actors[0].posed.positions.iter().filter_map(|p| camera.project(p.as_dvec3())) {
         least = least.min(pixel);
         most = most.max(pixel);
     }
-    let (mut centre, mut side) = ((least + most) / 2.0, (most - least).max_element() * 1.25);
+    let (mut centre, mut side) = ((least + most) / 2.0, (most - least).max_element() * 1.6);
     if options.split == Split::Train {
         // The detector's boxes are never exact.
         side *= rng.random_range(0.93..1.12);

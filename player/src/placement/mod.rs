@@ -1,0 +1,10 @@
+//! Putting the match on a table: finding surfaces, fitting the pitch, and the gestures that place it.
+//!
+//! No GPU, headset, file, thread or clock: sensor data and gestures come in as values, poses go out. Everything is in the
+//! *room frame*: metres, right-handed, whatever axes the sensor or the runtime has; `up` is against gravity.
+
+mod surface;
+mod tabletop;
+
+pub use surface::{Plane, Surface, SurfaceId, SurfaceKind};
+pub use tabletop::{PITCH_SCALE_LIMITS, TabletopPose};
