@@ -3,10 +3,12 @@
 //! Positions are world metres of the pitch. The tabletop scale only matters to a headset: a picture of the pitch from
 //! 150 m and one of a table a hundredth of that size from 1.5 m are the same picture.
 
+mod eye;
 mod file;
 mod orbit;
 mod preset;
 
+pub use eye::EyeView;
 pub use file::{CameraFile, CameraFileError};
 pub use orbit::OrbitCamera;
 pub use preset::{NoSuchPreset, Preset};

@@ -7,8 +7,10 @@ mod atlas;
 mod buffers;
 mod pipelines;
 mod target;
+mod view;
 
-pub use target::Target;
+pub use target::{Canvas, PictureFormat, Surroundings, Target};
+pub use view::View;
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::{
@@ -24,7 +26,8 @@ use crate::{
 };
 use atlas::AtlasTexture;
 use buffers::{Growing, Triangles};
-use pipelines::Pipelines;
+use pipelines::{Pipelines, multiview_mask};
+use view::{MOST_VIEWS, ViewUniform};
 
 /// Pictures are linear light in the shaders and sRGB bytes in memory.
 pub const COLOUR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
@@ -33,13 +36,6 @@ const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 pub const SAMPLES: u32 = 4;
 /// Markings that fit the shader's array; a pitch has 27.
 const MOST_MARKINGS: usize = 60;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct ViewUniform {
-    clip_from_world: [[f32; 4]; 4],
-    eye_m: [f32; 4],
-}
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -56,6 +52,7 @@ struct StageUniform {
 
 /// Everything on the GPU that a picture of the table needs.
 pub struct Renderer {
+    format: PictureFormat,
     pipelines: Pipelines,
     view: Buffer,
     scene: BindGroup,
@@ -71,9 +68,15 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Builds the pipelines and uploads a stage.
+    /// Builds the pipelines for pictures on a screen ([`Target`]) and uploads a stage.
     #[must_use]
     pub fn new(device: &Device, queue: &Queue, stage: &Stage) -> Self {
+        Self::with_format(device, queue, stage, PictureFormat::default())
+    }
+
+    /// Builds the pipelines for pictures of another format and uploads a stage.
+    #[must_use]
+    pub fn with_format(device: &Device, queue: &Queue, stage: &Stage, format: PictureFormat) -> Self {
         let uniform = |label, size: usize| {
             device.create_buffer(&BufferDescriptor {
                 label: Some(label),
@@ -82,7 +85,7 @@ impl Renderer {
                 mapped_at_creation: false,
             })
         };
-        let view = uniform("view", size_of::<ViewUniform>());
+        let view = uniform("view", MOST_VIEWS * size_of::<ViewUniform>());
         let sizes = uniform("stage", size_of::<StageUniform>());
         queue.write_buffer(&sizes, 0, bytemuck::bytes_of(&stage_uniform(stage)));
 
@@ -118,6 +121,7 @@ impl Renderer {
         };
         let pipelines = Pipelines::new(
             device,
+            format,
             &layout(&[Some(&scene_layout)]),
             &layout(&[Some(&scene_layout), Some(&atlas_layout)]),
         );
@@ -128,6 +132,7 @@ impl Renderer {
         fixtures.write(device, queue, &stage.solids.vertices, &stage.solids.indices);
         nets.write(device, queue, &stage.nets.vertices, &stage.nets.indices);
         Self {
+            format,
             pipelines,
             view,
             scene,
@@ -157,33 +162,42 @@ impl Renderer {
 
     /// Draws what was uploaded, seen from `camera`, into `target`.
     pub fn draw(&self, queue: &Queue, encoder: &mut CommandEncoder, target: &Target, camera: &ViewCamera) {
-        let view = ViewUniform {
-            clip_from_world: camera.clip_from_world().to_cols_array_2d(),
-            eye_m: camera.position_m.as_vec3().extend(1.0).into(),
-        };
-        queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&view));
+        self.draw_views(queue, encoder, &target.canvas, &[camera.into()]);
+    }
 
+    /// Draws what was uploaded into a canvas of this renderer's format: as many views as the format has, in one pass.
+    ///
+    /// The views take effect when the encoder is submitted: submit before drawing other views.
+    pub fn draw_views(&self, queue: &Queue, encoder: &mut CommandEncoder, canvas: &Canvas, views: &[View]) {
+        let Some(uniform) = view::uniform(views) else { return };
+        queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&uniform));
+
+        let backdrop = self.format.surroundings == Surroundings::Backdrop;
+        let clear = if backdrop { Color::BLACK } else { Color::TRANSPARENT };
+        let store = if canvas.resolved.is_some() { StoreOp::Discard } else { StoreOp::Store };
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("table"),
             color_attachments: &[Some(RenderPassColorAttachment {
-                view: &target.samples,
+                view: &canvas.colour,
                 depth_slice: None,
-                resolve_target: Some(&target.resolved),
-                ops: Operations { load: LoadOp::Clear(Color::BLACK), store: StoreOp::Discard },
+                resolve_target: canvas.resolved.as_ref(),
+                ops: Operations { load: LoadOp::Clear(clear), store },
             })],
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
-                view: &target.depth,
+                view: &canvas.depth,
                 // Reversed depth: infinity is 0.
                 depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
                 stencil_ops: None,
             }),
             timestamp_writes: None,
             occlusion_query_set: None,
-            multiview_mask: None,
+            multiview_mask: multiview_mask(self.format.views),
         });
         pass.set_bind_group(0, &self.scene, &[]);
-        pass.set_pipeline(&self.pipelines.backdrop);
-        pass.draw(0..3, 0..1);
+        if backdrop {
+            pass.set_pipeline(&self.pipelines.backdrop);
+            pass.draw(0..3, 0..1);
+        }
         pass.set_pipeline(&self.pipelines.ground);
         self.ground.draw(&mut pass);
         if self.shadow_count > 0 {

@@ -1,5 +1,7 @@
 //! The render pipelines: one per kind of thing, all with the same target, depth and samples.
 
+use std::num::NonZeroU32;
+
 use wgpu::{
     BlendState, ColorTargetState, ColorWrites, CompareFunction, DepthStencilState, Device, FragmentState,
     MultisampleState, PipelineLayout, PrimitiveState, PrimitiveTopology, RenderPipeline,
@@ -7,7 +9,7 @@ use wgpu::{
     VertexState, VertexStepMode, vertex_attr_array,
 };
 
-use super::{COLOUR_FORMAT, DEPTH_FORMAT, SAMPLES};
+use super::{DEPTH_FORMAT, PictureFormat, view::for_two_views};
 use crate::scene::{BodyVertex, GroundVertex, NetVertex, Shadow, SolidVertex};
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
@@ -45,7 +47,13 @@ struct Kind<'a> {
 
 impl Pipelines {
     /// `plain` binds the view, `textured` also an atlas.
-    pub(super) fn new(device: &Device, plain: &PipelineLayout, textured: &PipelineLayout) -> Self {
+    pub(super) fn new(
+        device: &Device,
+        format: PictureFormat,
+        plain: &PipelineLayout,
+        textured: &PipelineLayout,
+    ) -> Self {
+        let build = |layout, kind: &Kind<'_>| build(device, format, layout, kind);
         let triangles = |name, shader, mixing, stride, attributes| Kind {
             name,
             shader,
@@ -62,12 +70,10 @@ impl Pipelines {
         let net_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x2];
         Self {
             backdrop: build(
-                device,
                 plain,
                 &triangles("backdrop", include_str!("shaders/backdrop.wgsl"), Mixing::Background, 0, &[]),
             ),
             ground: build(
-                device,
                 plain,
                 &triangles(
                     "ground",
@@ -78,7 +84,6 @@ impl Pipelines {
                 ),
             ),
             solid: build(
-                device,
                 plain,
                 &triangles(
                     "solid",
@@ -89,7 +94,6 @@ impl Pipelines {
                 ),
             ),
             shadow: build(
-                device,
                 plain,
                 &Kind {
                     name: "shadow",
@@ -102,7 +106,6 @@ impl Pipelines {
                 },
             ),
             body: build(
-                device,
                 textured,
                 &triangles(
                     "body",
@@ -113,7 +116,6 @@ impl Pipelines {
                 ),
             ),
             net: build(
-                device,
                 plain,
                 &triangles(
                     "net",
@@ -127,10 +129,17 @@ impl Pipelines {
     }
 }
 
-fn build(device: &Device, layout: &PipelineLayout, kind: &Kind<'_>) -> RenderPipeline {
+/// The bits of the views that a pass or a pipeline draws at once; `None` for a single one.
+pub(super) fn multiview_mask(views: u32) -> Option<NonZeroU32> {
+    NonZeroU32::new((1 << views) - 1).filter(|_| views > 1)
+}
+
+fn build(device: &Device, format: PictureFormat, layout: &PipelineLayout, kind: &Kind<'_>) -> RenderPipeline {
+    let source = format!("{COMMON}\n{}", kind.shader);
+    let source = if format.views > 1 { for_two_views(&source) } else { source };
     let module = device.create_shader_module(ShaderModuleDescriptor {
         label: Some(kind.name),
-        source: ShaderSource::Wgsl(format!("{COMMON}\n{}", kind.shader).into()),
+        source: ShaderSource::Wgsl(source.into()),
     });
     let buffer = VertexBufferLayout {
         array_stride: kind.stride as u64,
@@ -160,18 +169,18 @@ fn build(device: &Device, layout: &PipelineLayout, kind: &Kind<'_>) -> RenderPip
             stencil: Default::default(),
             bias: Default::default(),
         }),
-        multisample: MultisampleState { count: SAMPLES, ..Default::default() },
+        multisample: MultisampleState { count: format.samples, ..Default::default() },
         fragment: Some(FragmentState {
             module: &module,
             entry_point: Some("fragment"),
             compilation_options: Default::default(),
             targets: &[Some(ColorTargetState {
-                format: COLOUR_FORMAT,
+                format: format.colour,
                 blend: (kind.mixing == Mixing::Transparent).then_some(BlendState::ALPHA_BLENDING),
                 write_mask: ColorWrites::ALL,
             })],
         }),
-        multiview_mask: None,
+        multiview_mask: multiview_mask(format.views),
         cache: None,
     })
 }
