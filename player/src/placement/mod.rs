@@ -3,6 +3,8 @@
 //! No GPU, headset, file, thread or clock: sensor data and gestures come in as values, poses go out. Everything is in the
 //! *room frame*: metres, right-handed, whatever axes the sensor or the runtime has; `up` is against gravity.
 
+pub mod fit;
+pub mod gesture;
 mod surface;
 mod tabletop;
 

@@ -3,6 +3,8 @@
 use glam::{DMat4, DQuat, DVec3};
 use serde::Serialize;
 
+use crate::scene::TURF_THICKNESS_M;
+
 /// Room metres per metre of the pitch, least and most: 1:1000 (a pitch as long as a hand) to 1:20 (five metres).
 pub const PITCH_SCALE_LIMITS: [f64; 2] = [0.001, 0.05];
 
@@ -26,6 +28,19 @@ impl TabletopPose {
             along.reject_from_normalized(up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
         let orientation = DQuat::from_mat3(&glam::DMat3::from_cols(x, up, x.cross(up))).normalize();
         Self { position_m, orientation, scale }
+    }
+
+    /// As [`Self::upright`], with the underside of the turf at `foot_m`: how a match stands on a real surface, its turf
+    /// as thick as [`TURF_THICKNESS_M`] says.
+    #[must_use]
+    pub fn standing_on(foot_m: DVec3, up: DVec3, along: DVec3, scale: f64) -> Self {
+        Self::upright(foot_m + up * (TURF_THICKNESS_M * scale), up, along, scale)
+    }
+
+    /// The point of the surface under the centre mark, room metres.
+    #[must_use]
+    pub fn foot_m(&self) -> DVec3 {
+        self.to_room(DVec3::NEG_Y * TURF_THICKNESS_M)
     }
 
     /// The surface's up, unit length.
@@ -75,6 +90,13 @@ mod tests {
         assert!(pose.to_pitch(pose.to_room(point)).distance(point) < 1e-9);
         assert!(pose.room_from_pitch().transform_point3(point).distance(pose.to_room(point)) < 1e-12);
         assert!(pose.turned(1.0).up().distance(up) < 1e-12);
+    }
+
+    #[test]
+    fn it_stands_on_the_underside_of_its_turf() {
+        let foot = DVec3::new(0.2, 0.75, -1.0);
+        let pose = TabletopPose::standing_on(foot, DVec3::Y, DVec3::X, 0.01);
+        assert!(pose.foot_m().distance(foot) < 1e-12 && pose.position_m.y > foot.y);
     }
 
     #[test]
