@@ -17,6 +17,8 @@ pub mod app;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod offscreen;
 #[cfg(not(target_arch = "wasm32"))]
+pub mod scan;
+#[cfg(not(target_arch = "wasm32"))]
 pub mod session;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod source;

@@ -4,6 +4,7 @@
 
 mod bench;
 mod inspect;
+mod place;
 mod render;
 mod window;
 
@@ -20,6 +21,7 @@ const EXAMPLES: &str = "Examples:
   player http://192.168.1.20:8080/
   player render target/demo/stream --frame 0 --camera broadcast --size 1280x720 --out frame.png
   player inspect target/demo/stream
+  player place --cloud scan.pcd --json table.json
   player bench target/demo/stream --json bench.json";
 
 /// Shows a Holopitch stream on a table.
@@ -38,6 +40,8 @@ enum Command {
     Render(render::RenderArguments),
     /// Say what a stream holds, and check every hash.
     Inspect(inspect::InspectArguments),
+    /// Find the table in a scan of a room.
+    Place(place::PlaceArguments),
     /// Measure decoding, uploading, drawing and seeking.
     Bench(bench::BenchArguments),
 }
@@ -59,6 +63,7 @@ pub(crate) fn run() -> ExitCode {
     let done = match arguments.command {
         Some(Command::Render(arguments)) => render::run(&arguments),
         Some(Command::Inspect(arguments)) => inspect::run(&arguments),
+        Some(Command::Place(arguments)) => place::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
         None => window::run(&arguments.window),
     };

@@ -1,0 +1,231 @@
+//! Finding surfaces in what a depth sensor measured: planes by growing or sampling, refined robustly, with outlines,
+//! obstacles, kinds, and a reason for each level surface that is not a place to stand on.
+//!
+//! The order of one [`Finder::find`]: candidate planes (`blocks` for organised clouds, `scattered` for others), each
+//! refined on all points near it (`robust`), cut into connected pieces with outlines (`footprint`, `mask`, `contour`),
+//! refined again on the points of the piece, held against gravity (`gravity`), the picture (`edges`) and each other
+//! (`classify`). No clock, thread or generator state: the same cloud gives the same answer.
+
+mod blocks;
+mod classify;
+mod contour;
+mod edges;
+mod footprint;
+mod gravity;
+mod mask;
+mod moments;
+mod neighbours;
+mod noise;
+mod robust;
+mod scattered;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::{PointCloud, Surface, SurfaceId, SurfaceKind};
+use blocks::BlockGrid;
+use classify::Piece;
+use edges::EdgeView;
+use footprint::Survey;
+use moments::Fit;
+
+pub use classify::Refusal;
+pub use gravity::{Up, UpSource};
+pub use noise::Noise;
+
+/// Most points that single points are looked at with; sums over blocks use all of them.
+const MOST_POINTS: usize = 40_000;
+
+/// Pieces of one plane that are kept.
+const PIECES_OF_A_PLANE: usize = 3;
+
+/// Two fits of nearly the same plane are one: cosine of 4 degrees.
+const SAME_PLANE: f64 = 0.9976;
+
+/// Finds surfaces in clouds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Finder {
+    /// Noise of the sensor; `None`: triangulated for organised clouds, even with 8 mm for others.
+    pub noise: Option<Noise>,
+}
+
+/// A surface with what was measured on it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FoundSurface {
+    /// The surface.
+    #[serde(flatten)]
+    pub surface: Surface,
+    /// Height over the floor, when a floor was found.
+    pub height_m: Option<f64>,
+    /// Angle between its normal and up.
+    pub tilt_degrees: f64,
+    /// Area within the outline.
+    pub area_m2: f64,
+    /// Share of the area where nothing stands.
+    pub free_share: f64,
+    /// Root mean square distance of its points, weighted by the robust fit.
+    pub rms_m: f64,
+    /// Why it is no place to stand on, for surfaces that are level or nearly so.
+    pub refusal: Option<Refusal>,
+}
+
+/// What was found in one cloud.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// The direction against gravity that was used.
+    pub up: Up,
+    /// All surfaces, with ids that count from 0.
+    pub surfaces: Vec<FoundSurface>,
+    best: Option<usize>,
+}
+
+impl Finding {
+    /// The best place to stand on: a table, or else a seat; `None` when there is neither.
+    #[must_use]
+    pub fn table(&self) -> Option<&FoundSurface> {
+        self.best.and_then(|index| self.surfaces.get(index))
+    }
+
+    /// Picks the best of surfaces by kind, free area and confidence.
+    #[must_use]
+    pub fn new(up: Up, surfaces: Vec<FoundSurface>) -> Self {
+        let worth = |found: &FoundSurface| found.area_m2 * found.free_share * found.surface.confidence;
+        let best = [SurfaceKind::Table, SurfaceKind::Seat].into_iter().find_map(|kind| {
+            surfaces
+                .iter()
+                .enumerate()
+                .filter(|(_, found)| found.surface.kind == kind && found.refusal.is_none())
+                .max_by(|a, b| worth(a.1).total_cmp(&worth(b.1)))
+                .map(|(index, _)| index)
+        });
+        Self { up, surfaces, best }
+    }
+}
+
+impl Finder {
+    /// Finds the surfaces of a cloud.
+    #[must_use]
+    pub fn find(&self, cloud: &PointCloud) -> Finding {
+        let viewpoint = cloud.viewpoint_m();
+        let measured =
+            || cloud.points_m().iter().filter(|point| point.is_finite()).map(|point| point.as_dvec3());
+        let default_noise = if cloud.layout().is_some() { Noise::Triangulated } else { Noise::Even(0.008) };
+        let noise = self.noise.unwrap_or(default_noise);
+        let grid = BlockGrid::new(cloud, noise);
+        let points = match cloud.layout() {
+            Some((columns, rows)) => every_nth(cloud, columns, rows),
+            None => neighbours::thinned(measured(), thinning_m(measured().count())),
+        };
+        let is_dense = grid.is_some();
+        let survey = Survey {
+            points: &points,
+            viewpoint,
+            noise,
+            least_cell_m: if is_dense { 0.01 } else { 0.02 },
+            gap_m: if is_dense { 0.05 } else { 0.08 },
+        };
+        let planes = match &grid {
+            Some(grid) => distinct(&survey, grid.planes(viewpoint)),
+            None => scattered::planes(&survey, cloud.up()),
+        };
+        let pieces = pieces(&survey, &planes, grid.as_ref());
+
+        let view: DVec3 = points.iter().map(|point| (*point - viewpoint).normalize_or_zero()).sum();
+        let view = view.try_normalize().unwrap_or(DVec3::Z);
+        let up = match cloud.up() {
+            Some(direction) => Up { direction, source: UpSource::Given },
+            None => {
+                let vertical = grid.as_ref().and_then(|grid| grid.picture_up);
+                let votes: Vec<gravity::Vote> = pieces
+                    .iter()
+                    .map(|piece| (piece.fit.plane.normal, piece.footprint.measured as f64))
+                    .collect();
+                let vertical = vertical.unwrap_or_else(|| gravity::conventional_vertical(view));
+                gravity::estimate(vertical, view, &votes)
+            }
+        };
+        let verdicts = classify::classify(&pieces, up, viewpoint);
+        let surfaces = pieces.into_iter().zip(verdicts).zip(0..).map(|((piece, verdict), id)| {
+            let confidence = classify::confidence(&piece, &verdict, up);
+            let Piece { fit, footprint, .. } = piece;
+            FoundSurface {
+                surface: Surface {
+                    id: SurfaceId(id),
+                    kind: verdict.kind,
+                    plane: fit.plane,
+                    outline_m: footprint.outline_m,
+                    obstacles_m: footprint.obstacles_m,
+                    confidence,
+                },
+                height_m: verdict.height_m,
+                tilt_degrees: verdict.tilt_degrees,
+                area_m2: footprint.area_m2,
+                free_share: footprint.free_share,
+                rms_m: fit.rms_m,
+                refusal: verdict.refusal,
+            }
+        });
+        Finding::new(up, surfaces.collect())
+    }
+}
+
+/// Every n-th point of every n-th row, so that about [`MOST_POINTS`] are left.
+fn every_nth(cloud: &PointCloud, columns: usize, rows: usize) -> Vec<DVec3> {
+    let step = ((columns * rows) as f64 / MOST_POINTS as f64).sqrt().ceil().max(1.0) as usize;
+    let rows = cloud.points_m().chunks_exact(columns).step_by(step);
+    rows.flat_map(|row| row.iter().step_by(step))
+        .filter(|point| point.is_finite())
+        .map(|point| point.as_dvec3())
+        .collect()
+}
+
+/// Side of the cubes that a cloud without order is thinned to: small clouds keep every point, scans of a room one each 2 cm.
+fn thinning_m(count: usize) -> f64 {
+    if count <= MOST_POINTS / 2 { 0.002 } else { 0.02 }
+}
+
+/// Refines the planes of regions and drops those that came out the same.
+fn distinct(survey: &Survey<'_>, regions: Vec<Fit>) -> Vec<Fit> {
+    let mut planes: Vec<Fit> = Vec::new();
+    let is_known = |planes: &[Fit], fit: &Fit| {
+        planes.iter().any(|known| {
+            known.plane.normal.dot(fit.plane.normal) > SAME_PLANE
+                && known.plane.distance_m(fit.centroid).abs() < survey.reach_m(&known.plane, fit.centroid)
+        })
+    };
+    for region in regions {
+        if is_known(&planes, &region) {
+            continue;
+        }
+        let widest_m = 2.0 * survey.reach_m(&region.plane, region.centroid);
+        if let Some((fit, _)) =
+            robust::refine(survey.points, region.plane, survey.noise, survey.viewpoint, widest_m)
+            && !is_known(&planes, &fit)
+        {
+            planes.push(fit);
+        }
+    }
+    planes
+}
+
+/// Cuts planes into connected pieces, each refined on its own points and followed along its edges in the picture.
+fn pieces(survey: &Survey<'_>, planes: &[Fit], grid: Option<&BlockGrid>) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    for fit in planes {
+        for mut footprint in survey.pieces(fit.plane, PIECES_OF_A_PLANE) {
+            if !classify::is_notable(&footprint) {
+                continue;
+            }
+            let own: Vec<DVec3> =
+                survey.points.iter().copied().filter(|point| footprint.covers(*point)).collect();
+            let widest_m = 1.5 * survey.reach_m(&fit.plane, fit.centroid);
+            let refined = robust::refine(&own, fit.plane, survey.noise, survey.viewpoint, widest_m);
+            let fit = refined.map_or(*fit, |(fit, _)| fit);
+            footprint.lay_on(&fit.plane);
+            let mut piece = Piece { fit, footprint, edges: None };
+            piece.edges = grid.and_then(|grid| EdgeView::new(grid, &piece, survey));
+            pieces.push(piece);
+        }
+    }
+    pieces
+}

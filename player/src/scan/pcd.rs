@@ -1,0 +1,235 @@
+//! Point Cloud Data files of the Point Cloud Library, version 0.7: ascii, binary and binary_compressed.
+//!
+//! Only `x`, `y`, `z` are kept, found by name. The format: <https://pointclouds.org/documentation/tutorials/pcd_file_format.html>.
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    MOST_POINTS,
+    bytes::{Endian, Reader, Scalar},
+    error::Problem,
+    lzf,
+};
+use crate::placement::PointCloud;
+
+struct Field {
+    name: String,
+    scalar: Scalar,
+    count: usize,
+}
+
+impl Field {
+    fn size(&self) -> usize {
+        self.scalar.size() * self.count
+    }
+}
+
+#[derive(Default)]
+struct Header {
+    fields: Vec<Field>,
+    width: usize,
+    height: usize,
+    viewpoint: DVec3,
+    data: String,
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<PointCloud, Problem> {
+    let mut reader = Reader::new(bytes);
+    let header = header(&mut reader)?;
+    let count = header.width.saturating_mul(header.height);
+    let axes = axes(&header.fields)?;
+    let points = match header.data.as_str() {
+        "ascii" => ascii(&mut reader, &header, count, axes)?,
+        "binary" => {
+            let record = header.fields.iter().map(Field::size).sum::<usize>();
+            let body = reader.take(record.saturating_mul(count))?;
+            let offsets = axes.map(|axis| (offset(&header.fields, axis, 1), record));
+            gather(body, &header.fields, axes, offsets, count)?
+        }
+        "binary_compressed" => {
+            let packed = reader.scalar(Scalar::U32, Endian::Little)? as usize;
+            let size = reader.scalar(Scalar::U32, Endian::Little)? as usize;
+            let record = header.fields.iter().map(Field::size).sum::<usize>();
+            if size != record.saturating_mul(count) {
+                let problem = format!("{size} bytes announced, {count} points of {record} bytes expected");
+                return Err(Problem::at(format!("byte {}", reader.position() - 4), problem));
+            }
+            let body = lzf::expand(reader.take(packed)?, size)?;
+            // Compressed files hold one field after the other.
+            let offsets = axes.map(|axis| {
+                let size = header.fields.get(axis).map_or(0, Field::size);
+                (offset(&header.fields, axis, count), size)
+            });
+            gather(&body, &header.fields, axes, offsets, count)?
+        }
+        other => {
+            let problem = format!("DATA {other}: ascii, binary or binary_compressed expected");
+            return Err(Problem::at(reader.here(), problem));
+        }
+    };
+    let cloud = if header.height > 1 {
+        PointCloud::organised(points, header.width)
+    } else {
+        PointCloud::unorganised(points)
+    };
+    Ok(cloud.seen_from(header.viewpoint))
+}
+
+fn header(reader: &mut Reader<'_>) -> Result<Header, Problem> {
+    let mut header = Header::default();
+    let (mut names, mut sizes, mut types, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut points = None;
+    loop {
+        let Some(line) = reader.line()? else {
+            return Err(Problem::at(reader.here(), "the header has no DATA line: not a PCD file"));
+        };
+        let line = line.split('#').next().unwrap_or_default();
+        let mut words = line.split_whitespace();
+        let Some(key) = words.next() else { continue };
+        let values: Vec<&str> = words.collect();
+        let number = || -> Result<usize, Problem> {
+            values
+                .first()
+                .and_then(|word| word.parse().ok())
+                .filter(|&number| number <= MOST_POINTS)
+                .ok_or_else(|| Problem::at(reader.here(), format!("{key}: 0 to {MOST_POINTS} expected")))
+        };
+        match key {
+            "VERSION" => {}
+            "FIELDS" => names = values,
+            "SIZE" => sizes = values,
+            "TYPE" => types = values,
+            "COUNT" => counts = values,
+            "WIDTH" => header.width = number()?,
+            "HEIGHT" => header.height = number()?,
+            "POINTS" => points = Some(number()?),
+            "VIEWPOINT" => {
+                let read: Vec<f64> = values.iter().filter_map(|word| word.parse().ok()).collect();
+                let [x, y, z, ..] = read.as_slice() else {
+                    return Err(Problem::at(reader.here(), "VIEWPOINT: seven numbers expected"));
+                };
+                header.viewpoint = DVec3::new(*x, *y, *z);
+            }
+            "DATA" => {
+                header.data = values.first().copied().unwrap_or_default().to_ascii_lowercase();
+                break;
+            }
+            _ => return Err(Problem::at(reader.here(), format!("`{key}` is no PCD header: not a PCD file"))),
+        }
+    }
+    if names.len() != sizes.len()
+        || names.len() != types.len()
+        || !matches!(counts.len(), n if n == 0 || n == names.len())
+    {
+        return Err(Problem::at(
+            "header",
+            "FIELDS, SIZE, TYPE and COUNT must have the same number of entries",
+        ));
+    }
+    for (index, name) in names.iter().enumerate() {
+        let (size, kind) =
+            (sizes.get(index).copied().unwrap_or_default(), types.get(index).copied().unwrap_or_default());
+        let scalar = scalar(kind, size)
+            .ok_or_else(|| Problem::at("header", format!("field {name}: no type {kind} of {size} bytes")))?;
+        let count =
+            counts.get(index).map_or(Some(1), |word| word.parse().ok()).filter(|count| *count <= 4096);
+        let count =
+            count.ok_or_else(|| Problem::at("header", format!("field {name}: COUNT 0 to 4096 expected")))?;
+        header.fields.push(Field { name: (*name).into(), scalar, count });
+    }
+    // WIDTH and HEIGHT came with version 0.5; older files have POINTS only.
+    if header.height == 0 && header.width == 0 {
+        (header.width, header.height) = (points.unwrap_or(0), 1);
+    }
+    let size = header.width.saturating_mul(header.height);
+    if points.is_some_and(|points| points != size) || size > MOST_POINTS {
+        let problem = format!("{} × {} points do not agree with POINTS", header.width, header.height);
+        return Err(Problem::at("header", problem));
+    }
+    Ok(header)
+}
+
+fn scalar(kind: &str, size: &str) -> Option<Scalar> {
+    Some(match (kind, size) {
+        ("I", "1") => Scalar::I8,
+        ("I", "2") => Scalar::I16,
+        ("I", "4") => Scalar::I32,
+        ("I", "8") => Scalar::I64,
+        ("U", "1") => Scalar::U8,
+        ("U", "2") => Scalar::U16,
+        ("U", "4") => Scalar::U32,
+        ("U", "8") => Scalar::U64,
+        ("F", "4") => Scalar::F32,
+        ("F", "8") => Scalar::F64,
+        _ => return None,
+    })
+}
+
+/// Which fields are x, y and z.
+fn axes(fields: &[Field]) -> Result<[usize; 3], Problem> {
+    let find = |name: &str| {
+        fields
+            .iter()
+            .position(|field| field.name == name && field.count == 1)
+            .ok_or_else(|| Problem::at("header", format!("there is no field {name}: not a point cloud")))
+    };
+    Ok([find("x")?, find("y")?, find("z")?])
+}
+
+/// Bytes before a field when every field before it is stored `repeated` times.
+fn offset(fields: &[Field], axis: usize, repeated: usize) -> usize {
+    fields.iter().take(axis).map(Field::size).sum::<usize>().saturating_mul(repeated)
+}
+
+fn gather(
+    body: &[u8],
+    fields: &[Field],
+    axes: [usize; 3],
+    places: [(usize, usize); 3],
+    count: usize,
+) -> Result<Vec<Vec3>, Problem> {
+    let scalars = axes.map(|axis| fields.get(axis).map_or(Scalar::F32, |field| field.scalar));
+    let coordinate = |index: usize, axis: usize| -> Option<f64> {
+        let (start, step) = *places.get(axis)?;
+        scalars.get(axis)?.read(body.get(start + index * step..)?, Endian::Little)
+    };
+    (0..count)
+        .map(|index| {
+            let read =
+                || Some(DVec3::new(coordinate(index, 0)?, coordinate(index, 1)?, coordinate(index, 2)?));
+            read()
+                .map(|point| point.as_vec3())
+                .ok_or_else(|| Problem::at(format!("point {index}"), "missing"))
+        })
+        .collect()
+}
+
+fn ascii(
+    reader: &mut Reader<'_>,
+    header: &Header,
+    count: usize,
+    axes: [usize; 3],
+) -> Result<Vec<Vec3>, Problem> {
+    // A point takes at least a digit and a separator for each number.
+    let words = header.fields.iter().map(|field| field.count).sum::<usize>();
+    if count.saturating_mul(words) > reader.rest().len() / 2 + 1 {
+        let problem =
+            format!("{count} points announced, {} bytes left: the file is cut short", reader.rest().len());
+        return Err(Problem::at(reader.here(), problem));
+    }
+    let columns = axes.map(|axis| header.fields.iter().take(axis).map(|field| field.count).sum::<usize>());
+    let mut points = Vec::with_capacity(count);
+    while points.len() < count {
+        let Some(line) = reader.line()? else {
+            let problem = format!("{} of {count} points: the file is cut short", points.len());
+            return Err(Problem::at(reader.here(), problem));
+        };
+        if line.trim().is_empty() {
+            continue;
+        }
+        points.push(
+            super::point_of_line(line, columns).map_err(|problem| Problem::at(reader.here(), problem))?,
+        );
+    }
+    Ok(points)
+}
