@@ -91,6 +91,23 @@ impl Marking {
             Self::Spot { centre, .. } => vec![centre],
         }
     }
+
+    /// Whether the paint, [`LINE_WIDTH_M`] wide, covers a place of the pitch.
+    #[must_use]
+    pub fn covers(&self, place: DVec2) -> bool {
+        let half = LINE_WIDTH_M / 2.0;
+        match *self {
+            Self::Line { from, to } => {
+                let along = (place - from).dot(to - from) / (to - from).length_squared();
+                place.distance(from.lerp(to, along.clamp(0.0, 1.0))) < half
+            }
+            Self::Arc { centre, radius_m, start, sweep } => {
+                let angle = (place - centre).to_angle() - start;
+                (place.distance(centre) - radius_m).abs() < half && angle.rem_euclid(TAU) <= sweep
+            }
+            Self::Spot { centre, radius_m } => place.distance(centre) < radius_m,
+        }
+    }
 }
 
 impl Pitch {
@@ -169,6 +186,19 @@ mod tests {
                 assert!(pitch.contains(point, 1e-9), "{marking:?} leaves the pitch at {point}");
             }
         }
+    }
+
+    #[test]
+    fn paint_covers_its_own_middle_and_no_more_than_its_width() {
+        for marking in Pitch::default().markings() {
+            let points = marking.sample(0.25);
+            let inner = if points.len() > 2 { &points[1..points.len() - 1] } else { &points[..] };
+            assert!(inner.iter().all(|&point| marking.covers(point)), "{marking:?}");
+        }
+        let halfway = Marking::Line { from: DVec2::new(0.0, -34.0), to: DVec2::new(0.0, 34.0) };
+        assert!(halfway.covers(DVec2::new(0.05, 3.0)) && !halfway.covers(DVec2::new(0.07, 3.0)));
+        let quarter = Marking::Arc { centre: DVec2::ZERO, radius_m: 1.0, start: 0.0, sweep: FRAC_PI_2 };
+        assert!(quarter.covers(DVec2::new(0.6, 0.8)) && !quarter.covers(DVec2::new(-0.6, 0.8)));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use image::Rgb;
-use protocol::pitch::{LINE_WIDTH_M, Marking, Pitch};
+use protocol::pitch::{Marking, Pitch};
 
 use super::*;
 use crate::report::median;
@@ -35,19 +35,7 @@ fn colour_at(camera: &Camera, pitch: &Pitch, markings: &[Marking], pixel: DVec2)
     if !pitch.contains(place, 4.0) {
         return stand;
     }
-    let half = LINE_WIDTH_M / 2.0;
-    let painted = markings.iter().any(|marking| match *marking {
-        Marking::Line { from, to } => {
-            let t = ((place - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
-            place.distance(from.lerp(to, t)) < half
-        }
-        Marking::Arc { centre, radius_m, start, sweep } => {
-            let angle = (place - centre).to_angle() - start;
-            (place.distance(centre) - radius_m).abs() < half
-                && angle.rem_euclid(std::f64::consts::TAU) <= sweep
-        }
-        Marking::Spot { centre, radius_m } => place.distance(centre) < radius_m,
-    });
+    let painted = markings.iter().any(|marking| marking.covers(place));
     let mown = if (place.x / 5.0).rem_euclid(2.0) < 1.0 { 1.0 } else { 0.85 };
     if painted { DVec3::new(205.0, 220.0, 200.0) } else { DVec3::new(80.0, 130.0, 25.0) * mown }
 }
