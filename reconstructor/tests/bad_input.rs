@@ -100,7 +100,7 @@ fn correspondences_that_fix_no_camera() {
     let good: Value = serde_json::from_slice(&fs::read(demo("correspondences.json")).unwrap()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("points.json");
-    let mut complain = |points: Value| {
+    let complain = |points: Value| {
         let mut file = good.clone();
         file["points"] = points;
         fs::write(&path, file.to_string()).unwrap();
