@@ -124,7 +124,7 @@ fn a_clip_without_a_pitch() {
     if !ready() {
         return;
     }
-    let fractal = ["-f", "lavfi", "-i", "mandelbrot=size=640x360", "-frames:v", "2", "-pix_fmt", "yuv420p"];
+    let fractal = ["-f", "lavfi", "-i", "mandelbrot=size=1280x720", "-frames:v", "2", "-pix_fmt", "yuv420p"];
     if let Some((_folder, clip)) = made_by_ffmpeg(&fractal, "fractal.mp4") {
         has(&refused(&clip, &demo("correspondences.json")), &["frame 0", "no pitch in view"]);
     }
