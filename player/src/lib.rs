@@ -1,7 +1,8 @@
 //! Holopitch stream to pixels.
 //!
 //! [`scene`], [`renderer`], [`camera`] and [`timeline`] use no file, socket, thread or clock and compile for the web.
-//! [`source`] fetches and decodes streams, [`app`] is the desktop window, [`offscreen`] draws without a window.
+//! [`source`] fetches and decodes streams, [`app`] is the desktop window, [`offscreen`] draws without a window,
+//! [`xr`] draws on a headset.
 
 // Tests may panic: that is how they fail.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -22,3 +23,5 @@ pub mod scan;
 pub mod session;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod source;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod xr;

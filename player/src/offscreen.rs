@@ -4,8 +4,9 @@ use image::RgbaImage;
 use thiserror::Error;
 use wgpu::{
     Adapter, Backends, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType, Extent3d,
-    Instance, InstanceDescriptor, MapMode, Origin3d, PollType, Queue, RequestAdapterError,
-    RequestAdapterOptions, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+    Features, Instance, InstanceDescriptor, MapMode, Origin3d, PollType, Queue, RequestAdapterError,
+    RequestAdapterOptions, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture,
+    TextureAspect,
 };
 
 use crate::{
@@ -83,6 +84,8 @@ impl Offscreen {
         let name = adapter.get_info().name;
         let descriptor = DeviceDescriptor {
             label: Some("offscreen"),
+            // Both views of a headset in one pass, where the adapter can.
+            required_features: adapter.features() & (Features::MULTIVIEW | Features::MULTISAMPLE_ARRAY),
             required_limits: adapter.limits(),
             ..Default::default()
         };
@@ -138,48 +141,56 @@ impl Offscreen {
 
     /// The pixels of a target: sRGB, opaque.
     pub fn read_back(&self, target: &Target) -> Result<RgbaImage, OffscreenError> {
-        let (width, height) = target.size_px();
-        let row_bytes = width * 4;
-        let padded_bytes = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = self.device.create_buffer(&BufferDescriptor {
-            label: Some("pixels"),
-            size: u64::from(padded_bytes) * u64::from(height),
-            usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            TexelCopyTextureInfo {
-                texture: &target.texture,
-                mip_level: 0,
-                origin: Origin3d::ZERO,
-                aspect: TextureAspect::All,
-            },
-            TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(padded_bytes),
-                    rows_per_image: None,
-                },
-            },
-            Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-        self.queue.submit([encoder.finish()]);
-        // A failed mapping shows as an error of get_mapped_range below.
-        buffer.slice(..).map_async(MapMode::Read, |_| {});
-        self.finish()?;
-        let mapped = buffer
-            .slice(..)
-            .get_mapped_range()
-            .map_err(|error| OffscreenError::ReadBack(error.to_string()))?;
-        let mut pixels = Vec::with_capacity(row_bytes as usize * height as usize);
-        for row in mapped.chunks_exact(padded_bytes as usize) {
-            pixels.extend_from_slice(&row[..row_bytes as usize]);
-        }
-        RgbaImage::from_raw(width, height, pixels)
-            .ok_or_else(|| OffscreenError::ReadBack("the picture came back with a wrong size".to_owned()))
+        read_layer(&self.device, &self.queue, &target.texture, 0)
     }
+}
+
+/// The pixels of one layer of a texture with four bytes per pixel, in the texture's own order of colours; waits for the GPU.
+pub(crate) fn read_layer(
+    device: &Device,
+    queue: &Queue,
+    texture: &Texture,
+    layer: u32,
+) -> Result<RgbaImage, OffscreenError> {
+    let (width, height) = (texture.width(), texture.height());
+    let row_bytes = width * 4;
+    let padded_bytes = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = device.create_buffer(&BufferDescriptor {
+        label: Some("pixels"),
+        size: u64::from(padded_bytes) * u64::from(height),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = device.create_command_encoder(&Default::default());
+    encoder.copy_texture_to_buffer(
+        TexelCopyTextureInfo {
+            texture,
+            mip_level: 0,
+            origin: Origin3d { x: 0, y: 0, z: layer },
+            aspect: TextureAspect::All,
+        },
+        TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(padded_bytes),
+                rows_per_image: None,
+            },
+        },
+        Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+    queue.submit([encoder.finish()]);
+    // A failed mapping shows as an error of get_mapped_range below.
+    buffer.slice(..).map_async(MapMode::Read, |_| {});
+    let read_back = |error: &dyn std::fmt::Display| OffscreenError::ReadBack(error.to_string());
+    device.poll(PollType::wait_indefinitely()).map_err(|error| read_back(&error))?;
+    let mapped = buffer.slice(..).get_mapped_range().map_err(|error| read_back(&error))?;
+    let mut pixels = Vec::with_capacity(row_bytes as usize * height as usize);
+    for row in mapped.chunks_exact(padded_bytes as usize) {
+        pixels.extend_from_slice(&row[..row_bytes as usize]);
+    }
+    RgbaImage::from_raw(width, height, pixels)
+        .ok_or_else(|| OffscreenError::ReadBack("the picture came back with a wrong size".to_owned()))
 }
 
 fn instance(backends: Backends) -> Instance {

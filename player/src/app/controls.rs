@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The slider over the whole match.
-pub(super) fn timeline(ui: &mut Ui, session: &mut Session, now: Duration) {
+pub(crate) fn timeline(ui: &mut Ui, session: &mut Session, now: Duration) {
     let Some(timeline) = session.timeline().copied() else {
         ui.add_enabled_ui(false, |ui| slider(ui, &mut 0, 0));
         return;

@@ -16,6 +16,7 @@ use crate::{
     session::Session,
     source::Location,
 };
+pub(crate) use controls::timeline as timeline_slider;
 use scene_view::SceneView;
 
 /// How the table is looked at.

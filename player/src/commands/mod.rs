@@ -7,6 +7,7 @@ mod inspect;
 mod place;
 mod render;
 mod window;
+mod xr;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -22,7 +23,8 @@ const EXAMPLES: &str = "Examples:
   player render target/demo/stream --frame 0 --camera broadcast --size 1280x720 --out frame.png
   player inspect target/demo/stream
   player place --cloud scan.pcd --json table.json
-  player bench target/demo/stream --json bench.json";
+  player bench target/demo/stream --json bench.json
+  player xr target/demo/stream";
 
 /// Shows a Holopitch stream on a table.
 #[derive(Parser)]
@@ -44,6 +46,8 @@ enum Command {
     Place(place::PlaceArguments),
     /// Measure decoding, uploading, drawing and seeking.
     Bench(bench::BenchArguments),
+    /// Show the match on a headset, through OpenXR.
+    Xr(xr::XrArguments),
 }
 
 /// A stream that has to exist.
@@ -65,6 +69,7 @@ pub(crate) fn run() -> ExitCode {
         Some(Command::Inspect(arguments)) => inspect::run(&arguments),
         Some(Command::Place(arguments)) => place::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
+        Some(Command::Xr(arguments)) => xr::run(&arguments),
         None => window::run(&arguments.window),
     };
     match done {

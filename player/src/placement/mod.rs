@@ -7,10 +7,12 @@ mod cloud;
 mod finder;
 pub mod fit;
 pub mod gesture;
+mod source;
 mod surface;
 mod tabletop;
 
 pub use cloud::{DepthPicture, Intrinsics, PointCloud};
 pub use finder::{Finder, Finding, FoundSurface, Noise, Refusal, Up, UpSource};
+pub use source::PlaneSource;
 pub use surface::{Plane, Surface, SurfaceId, SurfaceKind};
 pub use tabletop::{PITCH_SCALE_LIMITS, TabletopPose};

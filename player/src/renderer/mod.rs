@@ -34,6 +34,8 @@ pub const COLOUR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 /// Samples per pixel.
 pub const SAMPLES: u32 = 4;
+/// The corners of the backdrop, linear light.
+const DARK: Color = Color { r: 0.022, g: 0.024, b: 0.029, a: 1.0 };
 /// Markings that fit the shader's array; a pitch has 27.
 const MOST_MARKINGS: usize = 60;
 
@@ -173,7 +175,11 @@ impl Renderer {
         queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&uniform));
 
         let backdrop = self.format.surroundings == Surroundings::Backdrop;
-        let clear = if backdrop { Color::BLACK } else { Color::TRANSPARENT };
+        let clear = match self.format.surroundings {
+            Surroundings::Backdrop => Color::BLACK,
+            Surroundings::Dark => DARK,
+            Surroundings::Transparent => Color::TRANSPARENT,
+        };
         let store = if canvas.resolved.is_some() { StoreOp::Discard } else { StoreOp::Store };
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("table"),

@@ -34,6 +34,8 @@ impl Default for PictureFormat {
 pub enum Surroundings {
     /// A quiet dark room.
     Backdrop,
+    /// The same darkness everywhere, for a headset that hides the room.
+    Dark,
     /// Nothing: the picture is transparent there. Colours are premultiplied by alpha.
     Transparent,
 }

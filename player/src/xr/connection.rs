@@ -1,0 +1,230 @@
+//! One OpenXR session from its first event to its last: connects, obeys the runtime's states, and runs frames in between.
+
+use std::{
+    sync::atomic::Ordering,
+    thread,
+    time::{Duration, Instant},
+};
+
+use openxr::{
+    Event, EventDataBuffer, FrameStream, FrameWaiter, Posef, ReferenceSpaceType, Session as XrSession, Space,
+    Vulkan,
+};
+
+use super::{
+    XrError,
+    eyes::Eyes,
+    ffi::{graphics::Graphics, passthrough::CameraPicture},
+    headset::{Headset, VIEWS},
+    input::{Input, profile_in_use},
+    lifecycle::{Action, Lifecycle},
+    panel_layer::PanelLayer,
+    planes::RuntimePlanes,
+    room,
+    run::{Show, XrOptions},
+};
+use crate::{
+    placement::PlaneSource,
+    renderer::{PictureFormat, View},
+    scene::Stage,
+};
+
+/// How long scripts wait for the stream's first frame.
+const SCRIPT_PATIENCE: Duration = Duration::from_secs(60);
+/// Between two looks at the events of a session that is not running.
+const IDLE: Duration = Duration::from_millis(10);
+
+/// How a session ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ended {
+    /// The user left, or the script has what it wanted.
+    Left,
+    /// The runtime took it away.
+    Lost,
+}
+
+/// A headset with a session on it. Fields are dropped in this order: what hangs on the session before the session.
+pub(super) struct Connection {
+    pub(super) eyes: Option<Eyes>,
+    pub(super) panel: PanelLayer,
+    pub(super) camera_picture: Option<CameraPicture>,
+    pub(super) planes: Option<RuntimePlanes>,
+    pub(super) input: Input,
+    pub(super) space: Space,
+    pub(super) waiter: FrameWaiter,
+    pub(super) stream: FrameStream<Vulkan>,
+    pub(super) session: XrSession<Vulkan>,
+    pub(super) graphics: Graphics,
+    pub(super) headset: Headset,
+    pub(super) life: Lifecycle,
+    pub(super) uploaded: bool,
+    pub(super) last_views: Option<[View; 2]>,
+    /// The runtime's time that is the zero of the match's clock, nanoseconds.
+    pub(super) clock_zero_ns: Option<i64>,
+    leaving: bool,
+}
+
+impl Connection {
+    /// Connects; the session begins when the runtime is ready.
+    pub(super) fn open(show: &mut Show, options: &XrOptions) -> Result<Self, XrError> {
+        let headset = Headset::find()?;
+        let graphics = Graphics::open(&headset.instance, headset.system)?;
+        let (session, waiter, stream) = graphics.create_session(&headset.instance, headset.system)?;
+        let local = || session.create_reference_space(ReferenceSpaceType::LOCAL, Posef::IDENTITY);
+        let space = local()?;
+        let input = Input::new(&headset, &session)?;
+        let panel = PanelLayer::new(&graphics, &session)?;
+        let planes = if headset.planes { RuntimePlanes::new(&session, local()?)? } else { None };
+        let camera_picture =
+            headset.mixing.camera_layer.then(|| CameraPicture::start(&session)).transpose()?;
+        if planes.is_none() {
+            tracing::warn!("{} detects no planes: the match can only float", headset.runtime);
+        }
+        let figures = &mut show.figures;
+        figures.runtime.clone_from(&headset.runtime);
+        figures.headset.clone_from(&headset.name);
+        figures.adapter.clone_from(&graphics.adapter);
+        figures.blend_mode = format!("{:?}", headset.mixing.blend_mode);
+        figures.multiview = graphics.views_per_pass(options.samples) == 2;
+        figures.samples = options.samples;
+        figures.plane_source = planes.as_ref().map_or("none", |planes| planes.name()).to_owned();
+        figures.sessions += 1;
+        show.panel_stale = true;
+        Ok(Self {
+            eyes: None,
+            panel,
+            camera_picture,
+            planes,
+            input,
+            space,
+            waiter,
+            stream,
+            session,
+            graphics,
+            headset,
+            life: Lifecycle::default(),
+            uploaded: false,
+            last_views: None,
+            clock_zero_ns: None,
+            leaving: false,
+        })
+    }
+
+    /// Shows the match until the session ends.
+    pub(super) fn show(&mut self, show: &mut Show, options: &XrOptions) -> Result<Ended, XrError> {
+        let begun = Instant::now();
+        loop {
+            if let Some(ended) = self.take_events(show)? {
+                return Ok(ended);
+            }
+            if !self.life.is_running() {
+                show.player.update(show.now());
+                thread::sleep(IDLE);
+                continue;
+            }
+            if self.leaving {
+                self.idle_frame()?;
+                continue;
+            }
+            self.frame(show, options)?;
+            if let Some(wanted) = options.exit_after_frames {
+                if show.records.len() >= wanted as usize {
+                    self.leaving = true;
+                    self.session.request_exit()?;
+                } else if show.records.is_empty() && begun.elapsed() > SCRIPT_PATIENCE {
+                    let problem = show.player.problem().unwrap_or("no frame of the match within a minute");
+                    return Err(XrError::Stream(problem.to_owned()));
+                }
+            }
+        }
+    }
+
+    /// Takes in what the runtime reports.
+    fn take_events(&mut self, show: &mut Show) -> Result<Option<Ended>, XrError> {
+        let mut buffer = EventDataBuffer::new();
+        while let Some(event) = self.headset.instance.poll_event(&mut buffer)? {
+            let action = match event {
+                Event::SessionStateChanged(change) => {
+                    tracing::info!("session: {:?}", change.state());
+                    self.life.on_state(change.state())
+                }
+                Event::InstanceLossPending(_) => Action::Rebuild,
+                Event::UserPresenceChangedEXT(change) => {
+                    tracing::info!(
+                        "headset {}",
+                        if change.is_user_present() { "put on" } else { "taken off" }
+                    );
+                    self.life.on_presence(change.is_user_present());
+                    Action::Continue
+                }
+                Event::ReferenceSpaceChangePending(change) => {
+                    if change.reference_space_type() == ReferenceSpaceType::LOCAL && change.pose_valid() {
+                        show.recentred(room::rigid(change.pose_in_previous_space()));
+                    }
+                    Action::Continue
+                }
+                Event::InteractionProfileChanged(_) => {
+                    for hand in ["/user/hand/left", "/user/hand/right"] {
+                        let profile = profile_in_use(&self.headset.instance, &self.session, hand);
+                        tracing::info!("{hand}: {}", profile.as_deref().unwrap_or("nothing"));
+                    }
+                    Action::Continue
+                }
+                Event::EventsLost(lost) => {
+                    tracing::warn!("the runtime dropped {} events", lost.lost_event_count());
+                    Action::Continue
+                }
+                _ => Action::Continue,
+            };
+            match action {
+                Action::Continue => {}
+                Action::Begin => {
+                    self.session.begin(VIEWS)?;
+                }
+                Action::End => {
+                    self.session.end()?;
+                }
+                Action::Exit => return Ok(Some(Ended::Left)),
+                Action::Rebuild => return Ok(Some(Ended::Lost)),
+            }
+        }
+        Ok(None)
+    }
+
+    /// A frame without pictures, as the runtime demands while it takes its leave.
+    fn idle_frame(&mut self) -> Result<(), XrError> {
+        let state = self.waiter.wait()?;
+        self.stream.begin()?;
+        Ok(self.stream.end(state.predicted_display_time, self.headset.mixing.blend_mode, &[])?)
+    }
+
+    pub(super) fn graphics(&self) -> &Graphics {
+        &self.graphics
+    }
+
+    /// The views of the last frame.
+    pub(super) fn last_views(&self) -> Option<[View; 2]> {
+        self.last_views
+    }
+
+    pub(super) fn format(&self) -> PictureFormat {
+        self.eyes.as_ref().map_or_else(PictureFormat::default, |eyes| eyes.format)
+    }
+
+    /// What the match stands on: without a view of the room also a table top.
+    pub(super) fn stage(&self, show: &Show) -> Stage {
+        Stage::new(show.pitch())
+    }
+
+    /// Mistakes that the graphics library has found so far.
+    pub(super) fn graphics_errors(&self) -> u64 {
+        self.graphics.errors.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        // Nothing of the runtime's may be in use by the GPU when it is given back.
+        let _ = self.graphics.device.poll(wgpu::PollType::wait_indefinitely());
+    }
+}
