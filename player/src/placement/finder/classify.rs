@@ -20,14 +20,21 @@ const MOST_TILT_DEGREES: f64 = 6.0;
 /// Leaning further than this, a surface is no leaning table but something else, degrees.
 const SLOPE_DEGREES: f64 = 40.0;
 
-/// Radius of the disc that has to fit on a surface: a match of half a metre by a third.
+/// Radius of the disc that has to fit on a surface: a match of 20 by 13 cm.
 const LEAST_DISC_M: f64 = 0.12;
+
+/// Radius of the disc that has to fit between the things on it: a match of 13 by 9 cm, a little over 1:1000. Small,
+/// because the sparse points of a phone make things wider than they are.
+const LEAST_FREE_DISC_M: f64 = 0.08;
 
 /// Least share of the surface that has to be free.
 const LEAST_FREE_SHARE: f64 = 0.35;
 
 /// Pieces smaller than this are not spoken about, square metres.
 const LEAST_AREA_M2: f64 = 0.02;
+
+/// Pieces that are mostly bridged gaps are no surfaces.
+const LEAST_MEASURED_SHARE: f64 = 0.15;
 
 /// Without a lower surface in view, a level one is taken for the floor when the sensor is this far above it, metres.
 const EYES_OVER_TABLE_M: f64 = 1.1;
@@ -37,6 +44,9 @@ const LEAST_EDGE_SHARE: f64 = 0.2;
 
 /// Points below a surface and beside it, as a share of its own, that show it to be raised.
 const LEAST_BELOW_SHARE: f64 = 0.02;
+
+/// The same for points without order, where no picture shows that they lie beyond an edge: more than wild points make up.
+const LEAST_BELOW_SHARE_SCATTERED: f64 = 0.08;
 
 /// Why a level or nearly level surface is not claimed as a place to stand on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -90,6 +100,8 @@ pub(super) struct Piece {
     pub(super) footprint: Footprint,
     /// Where its boundary runs in the picture; `None` for points without order.
     pub(super) edges: Option<EdgeView>,
+    /// The normal that its points say, where the fit was made level.
+    pub(super) measured_normal: DVec3,
 }
 
 /// What a piece is.
@@ -103,7 +115,7 @@ pub(super) struct Verdict {
 
 impl Piece {
     fn tilt_degrees(&self, up: DVec3) -> f64 {
-        self.fit.plane.normal.angle_between(up).to_degrees()
+        self.measured_normal.angle_between(up).to_degrees()
     }
 
     fn level_m(&self, up: DVec3) -> f64 {
@@ -112,8 +124,11 @@ impl Piece {
 
     /// Whether something shows that the piece does not lie on the ground.
     fn is_seen_raised(&self, below_sensor_m: f64) -> bool {
-        if self.footprint.below_share > LEAST_BELOW_SHARE && self.edges.is_none_or(|edges| edges.drops > 0.05)
-        {
+        let is_above_others = match self.edges {
+            Some(edges) => self.footprint.below_share > LEAST_BELOW_SHARE && edges.drops > 0.05,
+            None => self.footprint.below_share > LEAST_BELOW_SHARE_SCATTERED,
+        };
+        if is_above_others {
             return true;
         }
         match self.edges {
@@ -127,7 +142,7 @@ impl Piece {
 pub(super) fn classify(pieces: &[Piece], up: Up, viewpoint: DVec3) -> Vec<Verdict> {
     let up_direction = up.direction;
     let eye_m = up_direction.dot(viewpoint);
-    let is_level = |piece: &Piece| piece.tilt_degrees(up_direction) < MOST_TILT_DEGREES;
+    let is_level = |piece: &Piece| is_level(piece.tilt_degrees(up_direction));
     // The floor: the lowest large level piece, unless it is seen to be raised.
     let lowest = pieces
         .iter()
@@ -189,23 +204,28 @@ fn room_on(footprint: &Footprint) -> Option<Refusal> {
     if footprint.disc_m < LEAST_DISC_M {
         return Some(Refusal::TooSmall { disc_radius_m: footprint.disc_m, needed_m: LEAST_DISC_M });
     }
-    let is_free = footprint.free_disc_m >= LEAST_DISC_M && footprint.free_share >= LEAST_FREE_SHARE;
+    let is_free = footprint.free_disc_m >= LEAST_FREE_DISC_M && footprint.free_share >= LEAST_FREE_SHARE;
     (!is_free).then_some(Refusal::TooCluttered {
         free_share: footprint.free_share,
         free_disc_radius_m: footprint.free_disc_m,
     })
 }
 
+/// Whether an angle to gravity is that of a level surface.
+pub(super) fn is_level(tilt_degrees: f64) -> bool {
+    tilt_degrees < MOST_TILT_DEGREES
+}
+
 /// Whether a piece is worth a word.
 pub(super) fn is_notable(footprint: &Footprint) -> bool {
-    footprint.area_m2 >= LEAST_AREA_M2
+    footprint.area_m2 >= LEAST_AREA_M2 && footprint.measured_share >= LEAST_MEASURED_SHARE
 }
 
 /// How much a surface can be trusted, 0..1: an order, not a probability. Larger, better covered, and with gravity given
 /// and its height known, it is safer.
 pub(super) fn confidence(piece: &Piece, verdict: &Verdict, up: Up) -> f64 {
     let footprint = &piece.footprint;
-    let size = (0.5 + 0.5 * (footprint.free_disc_m - LEAST_DISC_M) / LEAST_DISC_M).clamp(0.3, 1.0);
+    let size = (0.5 * footprint.free_disc_m / LEAST_DISC_M).clamp(0.3, 1.0);
     let cover = (0.5 + 0.5 * footprint.measured_share / footprint.free_share.max(0.1)).clamp(0.0, 1.0);
     let level = match up.source {
         UpSource::Given => 1.0,

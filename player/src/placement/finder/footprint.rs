@@ -3,62 +3,17 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{contour, mask::Mask, noise::Noise};
-use crate::placement::Plane;
-
-/// Cells along the longer side: bounds the work whatever the cloud holds.
-const MOST_CELLS: f64 = 320.0;
+use super::noise::Noise;
+use crate::placement::{
+    Plane,
+    raster::{Frame, Mask, outline, plane_axes},
+};
 
 /// What stands on a surface is not higher than this above it, metres; more is a lamp or a shelf.
 const TALLEST_M: f64 = 0.5;
 
-/// The axes of a plane and its cells.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    plane: Plane,
-    along: DVec3,
-    across: DVec3,
-    corner: DVec2,
-    cell_m: f64,
-    columns: usize,
-    rows: usize,
-}
-
-impl Frame {
-    /// Coordinates on the plane, metres.
-    fn flat(&self, point: DVec3) -> DVec2 {
-        DVec2::new(self.along.dot(point), self.across.dot(point))
-    }
-
-    fn cell(&self, flat: DVec2) -> Option<usize> {
-        let place = (flat - self.corner) / self.cell_m;
-        let inside =
-            place.x >= 0.0 && place.y >= 0.0 && place.x < self.columns as f64 && place.y < self.rows as f64;
-        inside.then(|| place.y as usize * self.columns + place.x as usize)
-    }
-
-    /// A point of the plane from coordinates in cells.
-    fn lift(&self, place: DVec2) -> DVec3 {
-        let flat = self.corner + place * self.cell_m;
-        self.along * flat.x + self.across * flat.y - self.plane.normal * self.plane.offset_m
-    }
-
-    /// Covers `low..high` with cells and a rim around them.
-    fn new(plane: Plane, low: DVec2, high: DVec2, cell_m: f64) -> Self {
-        let (along, across) = axes(&plane);
-        let cell_m = cell_m.max((high - low).max_element() / MOST_CELLS);
-        let rim = 8.0 * cell_m;
-        let size = (high - low + DVec2::splat(2.0 * rim)) / cell_m;
-        let (columns, rows) = (size.x.ceil().max(1.0) as usize, size.y.ceil().max(1.0) as usize);
-        Self { plane, along, across, corner: low - rim, cell_m, columns, rows }
-    }
-}
-
-/// Two unit vectors on the plane, right-handed with its normal.
-fn axes(plane: &Plane) -> (DVec3, DVec3) {
-    let along = plane.normal.any_orthonormal_vector();
-    (along, plane.normal.cross(along))
-}
+/// Twice as many points stand for a thing on the surface, if they lie together.
+const LEAST_THING: i32 = 16;
 
 /// One connected piece of a plane.
 pub(super) struct Footprint {
@@ -108,6 +63,8 @@ pub(super) struct Survey<'a> {
     pub(super) least_cell_m: f64,
     /// Widest gap between points of one surface, metres.
     pub(super) gap_m: f64,
+    /// Up, when level surfaces are to be fitted exactly level: see [`super::robust::level`].
+    pub(super) level_up: Option<DVec3>,
 }
 
 impl Survey<'_> {
@@ -118,7 +75,7 @@ impl Survey<'_> {
 
     /// The connected pieces of a plane, largest first, at most `most`.
     pub(super) fn pieces(&self, plane: Plane, most: usize) -> Vec<Footprint> {
-        let (along, across) = axes(&plane);
+        let (along, across) = plane_axes(&plane);
         let on: Vec<DVec2> = self
             .points
             .iter()
@@ -167,7 +124,14 @@ impl Survey<'_> {
 
     fn piece(&self, frame: Frame) -> Option<Footprint> {
         let new = || Mask::new(frame.columns, frame.rows);
-        let (mut on, mut above, mut through) = (new(), new(), new());
+        let (mut on, mut through) = (new(), new());
+        // Points on the surface minus twice the points above it: where something stands, the latter are the more.
+        let mut balance = vec![0_i32; frame.columns * frame.rows];
+        let mut weigh = |cell: usize, weight: i32| {
+            if let Some(slot) = balance.get_mut(cell) {
+                *slot += weight;
+            }
+        };
         let (mut measured, mut below) = (0_usize, 0_usize);
         for point in self.points {
             let distance = frame.plane.distance_m(*point);
@@ -175,6 +139,7 @@ impl Survey<'_> {
             if distance.abs() < reach_m {
                 if let Some(cell) = frame.cell(frame.flat(*point)) {
                     on.set(cell, true);
+                    weigh(cell, 1);
                     measured += 1;
                 }
             } else if distance < 0.0 {
@@ -189,7 +154,7 @@ impl Survey<'_> {
             } else if distance < TALLEST_M
                 && let Some(cell) = frame.cell(frame.flat(*point))
             {
-                above.set(cell, true);
+                weigh(cell, -2);
             }
         }
         let radius = ((self.gap_m / frame.cell_m).ceil() as usize).clamp(1, 7);
@@ -197,20 +162,30 @@ impl Survey<'_> {
         open.intersect(&through);
         let mut filled = on.closed(radius);
         filled.subtract(&open);
-        let filled = filled.largest_component().with_holes_filled();
+        // Spurs are where the backs of chairs and the sides of boxes pass through the height of the surface.
+        let filled = filled.largest_component().with_holes_filled().opened(radius.div_ceil(2).min(2));
+        let filled = filled.largest_component();
 
         let mut measured_cells = on;
         measured_cells.intersect(&filled);
+        let mut above = new();
+        for (cell, balance) in balance.iter().enumerate() {
+            above.set(cell, *balance < -2);
+        }
         let mut standing = above.closed(1);
         standing.intersect(&filled);
-        // A single cell is an outlier, not a thing.
-        let things = standing.components(3);
+        // A few points are outliers, not a thing; a candle is many points over one cell.
+        let weight = |thing: &Mask| -> i32 {
+            thing.cells().map(|cell| balance.get(cell).map_or(0, |balance| (-balance).max(0))).sum()
+        };
+        let mut things = standing.components(1);
+        things.retain(|thing| weight(thing) >= LEAST_THING);
         let mut free = filled.clone();
         for thing in &things {
             free.subtract(thing);
         }
         let lift = |mask: &Mask| -> Vec<DVec3> {
-            contour::outline(mask).into_iter().map(|corner| frame.lift(corner)).collect()
+            outline(mask).into_iter().map(|corner| frame.lift(corner)).collect()
         };
         let cells = filled.count().max(1) as f64;
         let outline_m = lift(&filled);

@@ -2,17 +2,15 @@
 //! obstacles, kinds, and a reason for each level surface that is not a place to stand on.
 //!
 //! The order of one [`Finder::find`]: candidate planes (`blocks` for organised clouds, `scattered` for others), each
-//! refined on all points near it (`robust`), cut into connected pieces with outlines (`footprint`, `mask`, `contour`),
+//! refined on all points near it (`robust`), cut into connected pieces with outlines (`footprint`),
 //! refined again on the points of the piece, held against gravity (`gravity`), the picture (`edges`) and each other
 //! (`classify`). No clock, thread or generator state: the same cloud gives the same answer.
 
 mod blocks;
 mod classify;
-mod contour;
 mod edges;
 mod footprint;
 mod gravity;
-mod mask;
 mod moments;
 mod neighbours;
 mod noise;
@@ -123,6 +121,7 @@ impl Finder {
             noise,
             least_cell_m: if is_dense { 0.01 } else { 0.02 },
             gap_m: if is_dense { 0.05 } else { 0.08 },
+            level_up: if is_dense { None } else { cloud.up() },
         };
         let planes = match &grid {
             Some(grid) => distinct(&survey, grid.planes(viewpoint)),
@@ -208,24 +207,53 @@ fn distinct(survey: &Survey<'_>, regions: Vec<Fit>) -> Vec<Fit> {
     planes
 }
 
-/// Cuts planes into connected pieces, each refined on its own points and followed along its edges in the picture.
+/// Cuts planes into connected pieces, each refined on its own points and followed along its edges in the picture. A point
+/// belongs to one piece only: a plane whose points mostly belong to larger ones is a slice through other things.
 fn pieces(survey: &Survey<'_>, planes: &[Fit], grid: Option<&BlockGrid>) -> Vec<Piece> {
     let mut pieces = Vec::new();
+    let mut claimed = vec![false; survey.points.len()];
     for fit in planes {
         for mut footprint in survey.pieces(fit.plane, PIECES_OF_A_PLANE) {
             if !classify::is_notable(&footprint) {
                 continue;
             }
-            let own: Vec<DVec3> =
-                survey.points.iter().copied().filter(|point| footprint.covers(*point)).collect();
+            let near = |point: &DVec3| fit.plane.distance_m(*point).abs() < 0.1 && footprint.covers(*point);
+            let own: Vec<DVec3> = survey.points.iter().copied().filter(near).collect();
             let widest_m = 1.5 * survey.reach_m(&fit.plane, fit.centroid);
             let refined = robust::refine(&own, fit.plane, survey.noise, survey.viewpoint, widest_m);
-            let fit = refined.map_or(*fit, |(fit, _)| fit);
+            let refined = refined.map_or(*fit, |(fit, _)| fit);
+            let plane = refined.plane;
+            let on = |point: &DVec3| {
+                plane.distance_m(*point).abs() < survey.reach_m(&plane, *point) && footprint.covers(*point)
+            };
+            let (mut members, mut fresh) = (Vec::new(), 0);
+            for (index, (point, claimed)) in survey.points.iter().zip(&claimed).enumerate() {
+                if on(point) {
+                    members.push(index);
+                    fresh += usize::from(!claimed);
+                }
+            }
+            if 2 * fresh < members.len() {
+                continue;
+            }
+            for index in members {
+                if let Some(slot) = claimed.get_mut(index) {
+                    *slot = true;
+                }
+            }
+            let tilt = survey.level_up.map(|up| plane.normal.angle_between(up).to_degrees());
+            let mut fit = refined;
+            if let (Some(up), Some(true)) = (survey.level_up, tilt.map(classify::is_level)) {
+                fit = robust::level(&own, fit, up, survey.noise.along_view_m(1.0));
+            }
             footprint.lay_on(&fit.plane);
-            let mut piece = Piece { fit, footprint, edges: None };
+            let mut piece = Piece { fit, footprint, edges: None, measured_normal: plane.normal };
             piece.edges = grid.and_then(|grid| EdgeView::new(grid, &piece, survey));
             pieces.push(piece);
         }
     }
     pieces
 }
+
+#[cfg(test)]
+mod tests;

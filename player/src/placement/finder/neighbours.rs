@@ -27,7 +27,8 @@ pub(super) fn thinned(points: impl Iterator<Item = DVec3>, cube_m: f64) -> Vec<D
 }
 
 fn cube(point: DVec3, side_m: f64) -> IVec3 {
-    (point / side_m).floor().as_ivec3()
+    // Far beyond any room all points share a cube; its neighbours must still be numbers.
+    (point / side_m).floor().clamp(DVec3::splat(-1e9), DVec3::splat(1e9)).as_ivec3()
 }
 
 /// Points in cubes as wide as the search reaches, so that neighbours are in 27 of them.

@@ -11,6 +11,9 @@ use crate::placement::Plane;
 /// Tukey's constant: 95 % efficiency on Gaussian noise.
 const TUKEY: f64 = 4.685;
 
+/// The same in units of the noise where only the height is fitted: narrower, against things that lie on the table.
+const LEVEL_CUT: f64 = 3.0;
+
 const MOST_ITERATIONS: usize = 12;
 
 /// Refines a plane on the points near it by iterated least squares with Tukey's biweight, on residuals in units of the
@@ -66,6 +69,43 @@ pub(super) fn refine(
         }
     }
     last
+}
+
+/// The same plane made level: its normal becomes `up` and only its height is fitted, where Tukey's biweight with the
+/// noise of the sensor as its scale is largest. The few noisy points of a phone tell the height of a table well and its
+/// tilt badly, and gravity is known far better; looking at all heights keeps low things on the table from winning.
+pub(super) fn level(points: &[DVec3], start: Fit, up: DVec3, sigma_m: f64) -> Fit {
+    let normal = if start.plane.normal.dot(up) < 0.0 { -up } else { up };
+    let middle = Plane::through(start.centroid, normal);
+    let cut = LEVEL_CUT * sigma_m;
+    let heights: Vec<f64> = points
+        .iter()
+        .map(|point| middle.distance_m(*point))
+        .filter(|height| height.abs() < 3.0 * cut)
+        .collect();
+    let weigh = |at: f64| {
+        heights.iter().filter_map(move |height| {
+            let ratio = (height - at) / cut;
+            (ratio.abs() < 1.0).then(|| (*height, (1.0 - ratio * ratio).powi(2)))
+        })
+    };
+    let trials = (-20..=20).map(|step| f64::from(step) * 0.1 * cut);
+    let support = |at: f64| weigh(at).map(|(_, weight)| weight.powf(1.5)).sum::<f64>();
+    let best =
+        trials.map(|at| (support(at), at)).max_by(|a, b| a.0.total_cmp(&b.0)).map_or(0.0, |(_, at)| at);
+    let mut at = best;
+    for _ in 0..MOST_ITERATIONS {
+        let (sum, weights) =
+            weigh(at).fold((0.0, 0.0), |(sum, all), (height, w)| (sum + w * height, all + w));
+        if weights > 0.0 {
+            at = sum / weights;
+        }
+    }
+    let (squares, weights) =
+        weigh(at).fold((0.0, 0.0), |(sum, all), (height, w)| (sum + w * (height - at).powi(2), all + w));
+    let rms_m = if weights > 0.0 { f64::sqrt(squares / weights) } else { start.rms_m };
+    let plane = Plane { normal, offset_m: middle.offset_m - at };
+    Fit { plane, centroid: plane.project(start.centroid), rms_m }
 }
 
 #[cfg(test)]

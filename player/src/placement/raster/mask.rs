@@ -2,64 +2,70 @@
 
 /// Cells in rows; those outside count as no.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Mask {
+pub(in crate::placement) struct Mask {
     columns: usize,
     rows: usize,
     cells: Vec<bool>,
 }
 
 impl Mask {
-    pub(super) fn new(columns: usize, rows: usize) -> Self {
+    pub(in crate::placement) fn new(columns: usize, rows: usize) -> Self {
         Self { columns, rows, cells: vec![false; columns * rows] }
     }
 
-    pub(super) fn columns(&self) -> usize {
+    pub(in crate::placement) fn columns(&self) -> usize {
         self.columns
     }
 
-    pub(super) fn get(&self, cell: usize) -> bool {
+    pub(in crate::placement) fn get(&self, cell: usize) -> bool {
         self.cells.get(cell).copied().unwrap_or(false)
     }
 
     /// The cell at a column and row that may lie outside.
-    pub(super) fn at(&self, column: i64, row: i64) -> bool {
+    pub(in crate::placement) fn at(&self, column: i64, row: i64) -> bool {
         let inside = (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
         inside && self.get(row as usize * self.columns + column as usize)
     }
 
-    pub(super) fn set(&mut self, cell: usize, value: bool) {
+    pub(in crate::placement) fn set(&mut self, cell: usize, value: bool) {
         if let Some(slot) = self.cells.get_mut(cell) {
             *slot = value;
         }
     }
 
     /// The cells that are set, in order.
-    pub(super) fn cells(&self) -> impl Iterator<Item = usize> {
+    pub(in crate::placement) fn cells(&self) -> impl Iterator<Item = usize> {
         self.cells.iter().enumerate().filter_map(|(cell, set)| set.then_some(cell))
     }
 
-    pub(super) fn count(&self) -> usize {
+    pub(in crate::placement) fn count(&self) -> usize {
         self.cells.iter().filter(|set| **set).count()
     }
 
-    pub(super) fn inverted(&self) -> Self {
+    pub(in crate::placement) fn inverted(&self) -> Self {
         Self { cells: self.cells.iter().map(|set| !set).collect(), ..*self }
     }
 
-    pub(super) fn intersect(&mut self, other: &Self) {
+    pub(in crate::placement) fn join(&mut self, other: &Self) {
+        for (own, other) in self.cells.iter_mut().zip(&other.cells) {
+            *own |= other;
+        }
+    }
+
+    pub(in crate::placement) fn intersect(&mut self, other: &Self) {
         for (own, other) in self.cells.iter_mut().zip(&other.cells) {
             *own &= other;
         }
     }
 
-    pub(super) fn subtract(&mut self, other: &Self) {
+    pub(in crate::placement) fn subtract(&mut self, other: &Self) {
         for (own, other) in self.cells.iter_mut().zip(&other.cells) {
             *own &= !other;
         }
     }
 
     /// Grown by a square of `radius` cells to every side.
-    pub(super) fn dilated(&self, radius: usize) -> Self {
+    pub(in crate::placement) fn dilated(&self, radius: usize) -> Self {
         let mut wide = Self::new(self.columns, self.rows);
         for (out, line) in
             wide.cells.chunks_exact_mut(self.columns).zip(self.cells.chunks_exact(self.columns))
@@ -75,12 +81,17 @@ impl Mask {
     }
 
     /// Gaps up to twice `radius` bridged; the rim has to be at least as wide.
-    pub(super) fn closed(&self, radius: usize) -> Self {
+    pub(in crate::placement) fn closed(&self, radius: usize) -> Self {
         self.dilated(radius).inverted().dilated(radius).inverted()
     }
 
+    /// What is narrower than twice `radius` taken away.
+    pub(in crate::placement) fn opened(&self, radius: usize) -> Self {
+        self.inverted().dilated(radius).inverted().dilated(radius)
+    }
+
     /// Pieces of at least `least` cells that hang together by edges, in the order of their first cells.
-    pub(super) fn components(&self, least: usize) -> Vec<Self> {
+    pub(in crate::placement) fn components(&self, least: usize) -> Vec<Self> {
         let mut left = self.clone();
         let mut pieces = Vec::new();
         let mut cells = Vec::new();
@@ -99,7 +110,7 @@ impl Mask {
     }
 
     /// The largest piece; the first of equals. Empty when nothing is set.
-    pub(super) fn largest_component(&self) -> Self {
+    pub(in crate::placement) fn largest_component(&self) -> Self {
         let mut left = self.clone();
         let (mut best, mut cells) = (Vec::new(), Vec::new());
         for start in 0..self.cells.len() {
@@ -139,7 +150,7 @@ impl Mask {
     }
 
     /// The same with every enclosed gap filled. The rim has to be empty.
-    pub(super) fn with_holes_filled(&self) -> Self {
+    pub(in crate::placement) fn with_holes_filled(&self) -> Self {
         let mut around = Vec::new();
         self.inverted().take_connected(0, &mut around);
         let mut outside = Self::new(self.columns, self.rows);
@@ -148,7 +159,7 @@ impl Mask {
     }
 
     /// Radius in cells of the largest disc of set cells (two-pass chamfer distance, Borgefors 1986; 8 % exact).
-    pub(super) fn largest_disc(&self) -> f64 {
+    pub(in crate::placement) fn largest_disc(&self) -> f64 {
         let (columns, rows) = (self.columns as i64, self.rows as i64);
         let mut distance: Vec<f64> = self.cells.iter().map(|set| if *set { f64::MAX } else { 0.0 }).collect();
         let mut pass = |cells: &mut dyn Iterator<Item = i64>, steps: [(i64, i64, f64); 4]| {
@@ -223,6 +234,8 @@ mod tests {
         let closed = mask.closed(1);
         assert_eq!(closed.components(1).len(), 1);
         assert_eq!(closed.count(), 15);
+        assert_eq!(closed.opened(1).count(), 15);
+        assert_eq!(mask.opened(1).count(), 0);
         let ring = drawn(&[".....", ".###.", ".#.#.", ".###.", "....."]);
         assert_eq!(ring.with_holes_filled().count(), 9);
         assert_eq!(ring.with_holes_filled().largest_disc(), 1.5);

@@ -9,7 +9,7 @@ const TOLERANCE: f64 = 1.0;
 
 /// The outer boundary of the first piece of a mask, corners in cells (x to the right, y down the rows, whole numbers are
 /// edges of cells), counter-clockwise when y is drawn upwards. Empty for an empty mask.
-pub(super) fn outline(mask: &Mask) -> Vec<DVec2> {
+pub(in crate::placement) fn outline(mask: &Mask) -> Vec<DVec2> {
     let Some(first) = mask.cells().next() else { return Vec::new() };
     let (column, row) = ((first % mask.columns()) as i64, (first / mask.columns()) as i64);
     // The first cell in order has nothing before it in its row and nothing in the row before: walk to the right along
