@@ -66,8 +66,7 @@ impl Images {
             mip_count: 1,
         })?;
         let images = swapchain.enumerate_images()?;
-        let textures =
-            images.into_iter().map(|image| graphics.wrap_image(image as u64, size_px, layers, format));
+        let textures = images.into_iter().map(|image| graphics.wrap_image(image, size_px, layers, format));
         let textures = textures.collect::<Result<_, _>>()?;
         Ok(Self { textures, swapchain, picture: Picture { size_px, layers, format } })
     }

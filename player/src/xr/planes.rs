@@ -218,7 +218,7 @@ mod tests {
         let mut broken = plane(4, DVec3::ZERO, DQuat::IDENTITY, platform);
         broken.outline_m = vec![[f32::NAN, 0.0], [1.0, 0.0], [1.0, 1.0]];
         let mut ids = BTreeMap::new();
-        let first = surfaces(&[table.clone()], &mut ids);
+        let first = surfaces(std::slice::from_ref(&table), &mut ids);
         let second = surfaces(&[broken, table], &mut ids);
         assert_eq!((first[0].id, first.len()), (second[0].id, second.len()));
         assert_eq!(first[0].kind, SurfaceKind::Table);

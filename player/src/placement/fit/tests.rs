@@ -92,7 +92,7 @@ fn a_plain_table_is_filled_along_its_longer_side() {
 fn the_main_camera_side_faces_the_viewer() {
     let table = table(1.6, 0.9);
     for angle in 0..12 {
-        let (sin, cos) = (f64::from(angle) * 0.5236 + 0.1).sin_cos();
+        let (sin, cos) = (f64::from(angle) * std::f64::consts::FRAC_PI_6 + 0.1).sin_cos();
         let viewer = DVec3::new(2.0 * cos, 1.6, 2.0 * sin);
         let wish = Wish { viewer_m: Some(viewer), ..Wish::of(Pitch::default()) };
         let pose = fit(&table, &wish).unwrap();
