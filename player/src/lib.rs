@@ -7,6 +7,7 @@
 // Tests may panic: that is how they fail.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod ar;
 pub mod camera;
 pub mod placement;
 pub mod renderer;

@@ -1,6 +1,7 @@
 //! Pictures without a window: finds a graphics adapter, draws, and reads the pixels back.
 
 use image::RgbaImage;
+use protocol::pitch::Pitch;
 use thiserror::Error;
 use wgpu::{
     Adapter, Backends, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType, Extent3d,
@@ -10,8 +11,9 @@ use wgpu::{
 };
 
 use crate::{
+    ar::RoomPicture,
     camera::ViewCamera,
-    renderer::{Renderer, Target},
+    renderer::{OnTable, RealTable, Renderer, Target},
     scene::{FrameScene, Stage},
 };
 
@@ -117,6 +119,26 @@ impl Offscreen {
         let mut renderer = Renderer::new(&self.device, &self.queue, stage);
         renderer.upload(&self.device, &self.queue, frame);
         self.draw(&renderer, &target, camera)?;
+        self.read_back(&target)
+    }
+
+    /// One picture of a frame on the table of a real room, in the size of the room's picture.
+    pub fn picture_in_room(
+        &self,
+        pitch: Pitch,
+        frame: &FrameScene,
+        room: &RoomPicture,
+        on_table: &OnTable,
+    ) -> Result<RgbaImage, OffscreenError> {
+        let (width_px, height_px) = room.colour.dimensions();
+        let target = self.target(width_px, height_px)?;
+        let mut table = RealTable::new(&self.device, &self.queue, pitch);
+        table.upload(&self.device, &self.queue, frame);
+        table.show_room(&self.device, &self.queue, room);
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        table.draw(&self.device, &self.queue, &mut encoder, &target, Some(on_table));
+        self.queue.submit([encoder.finish()]);
+        self.finish()?;
         self.read_back(&target)
     }
 

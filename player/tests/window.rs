@@ -7,8 +7,11 @@ mod support;
 use std::time::{Duration, Instant};
 
 use egui_kittest::{Harness, kittest::Queryable};
+use glam::DVec3;
 use player::{
-    app::PlayerApp,
+    app::{PlayerApp, Room},
+    ar::synthetic::SyntheticRoom,
+    placement::TabletopPose,
     session::Session,
     source::{Location, loader::Loader},
 };
@@ -143,4 +146,97 @@ fn a_broken_chunk_leaves_the_last_good_frame_and_says_why() {
     harness.get_by_label("Timeline").set_value_accesskit(12.0);
     wait_for_frame(&mut harness, 12);
     assert!(harness.query_by_label_contains("00001.glb").is_none(), "the message stays too long");
+}
+
+/// The window with a recorded room, and where a point of that room is in it.
+fn room_window(
+    folder: &std::path::Path,
+) -> (Harness<'static, PlayerApp>, impl Fn(&Harness<'static, PlayerApp>, DVec3) -> egui::Pos2) {
+    support::write_match(folder, FRAMES);
+    let location = Location::parse(folder.to_str().unwrap()).unwrap();
+    let drawn = SyntheticRoom::default();
+    let camera = drawn.cameras()[0];
+    let room = Room { picture: drawn.picture(&camera), surfaces: vec![drawn.table()], up: DVec3::Y };
+    let mut harness = Harness::builder().with_size([900.0, 700.0]).build_eframe(move |context| {
+        let wake = context.egui_ctx.clone();
+        let loader =
+            Loader::start(location.clone(), Limits::default(), move || wake.request_repaint()).unwrap();
+        PlayerApp::new(context, &location, Session::new(loader)).in_room(context, room.clone())
+    });
+    wait_for_frame(&mut harness, 0);
+    let at = move |harness: &Harness<'static, PlayerApp>, point: DVec3| {
+        let rect = harness.get_by_label("Room").rect();
+        let (pixel, _) = camera.project(point).unwrap();
+        rect.min + egui::vec2(pixel.x as f32 / 640.0, pixel.y as f32 / 480.0) * rect.size()
+    };
+    (harness, at)
+}
+
+fn standing(harness: &Harness<'static, PlayerApp>) -> Option<TabletopPose> {
+    harness.state().placement().unwrap().standing().map(|(pose, _)| pose)
+}
+
+#[test]
+fn the_mouse_places_the_match_on_the_table_of_a_recorded_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut harness, at) = room_window(folder.path());
+    assert!(harness.query_by_label("Point at a table").is_some());
+    let middle = DVec3::new(-0.2, 0.74, 0.0);
+    let move_to = |harness: &mut Harness<'static, PlayerApp>, point: DVec3| {
+        let place = at(harness, point);
+        harness.hover_at(place);
+        harness.step();
+        harness.step();
+    };
+    let button = |harness: &mut Harness<'static, PlayerApp>, point: DVec3, pressed: bool| {
+        let pos = at(harness, point);
+        let modifiers = egui::Modifiers::NONE;
+        harness.event(egui::Event::PointerButton {
+            pos,
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers,
+        });
+        harness.step();
+        harness.step();
+    };
+    // Pointing shows where it would stand; a click puts it there.
+    move_to(&mut harness, middle);
+    assert!(harness.query_by_label("Click to place the match here").is_some());
+    assert!(harness.state().placement().unwrap().shown().highlighted.is_some());
+    button(&mut harness, middle, true);
+    button(&mut harness, middle, false);
+    let placed = standing(&harness).expect("the match stands");
+    assert!(placed.foot_m().distance(middle) < 0.4 && (placed.foot_m().y - 0.74).abs() < 1e-9);
+    // Dragged by ten centimetres.
+    button(&mut harness, middle, true);
+    for step in 1..=5 {
+        move_to(&mut harness, middle + DVec3::X * 0.02 * f64::from(step));
+    }
+    button(&mut harness, middle + DVec3::X * 0.1, false);
+    let moved = standing(&harness).unwrap().foot_m() - placed.foot_m();
+    assert!(moved.distance(DVec3::X * 0.1) < 0.005, "moved by {moved}");
+    // Turned and scaled by the buttons and the wheel.
+    harness.get_by_label("Turn left").click();
+    harness.step();
+    harness.step();
+    assert!(standing(&harness).unwrap().orientation.angle_between(placed.orientation) > 0.2);
+    move_to(&mut harness, middle);
+    harness.event(egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: egui::vec2(0.0, -50.0),
+        modifiers: egui::Modifiers::NONE,
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Wheel,
+    });
+    for _ in 0..20 {
+        harness.step();
+    }
+    assert!(standing(&harness).unwrap().scale < placed.scale * 0.99, "the wheel scales");
+    // Escape lifts it off again.
+    harness.key_press(egui::Key::Escape);
+    harness.step();
+    harness.step();
+    assert!(standing(&harness).is_none());
+    assert!(harness.query_by_label("Click to place the match here").is_some());
 }

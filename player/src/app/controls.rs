@@ -9,9 +9,14 @@ use protocol::playback::Speed;
 use super::Look;
 use crate::{
     camera::Preset,
+    placement::gesture::Event,
     session::Session,
     timeline::{SPEEDS_PERCENT, speed_label},
 };
+
+/// One press of a button turns by this angle, radians, and scales by this factor.
+const TURN_STEP: f64 = 0.26;
+const SCALE_STEP: f64 = 1.1;
 
 /// The slider over the whole match.
 pub(crate) fn timeline(ui: &mut Ui, session: &mut Session, now: Duration) {
@@ -61,6 +66,19 @@ pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: 
         ui.add_space(8.0);
         ui.label(position(session));
     });
+}
+
+/// What a mouse wheel and Escape do, as buttons for those who have neither.
+pub(super) fn placing(ui: &mut Ui, standing: bool) -> Vec<Event> {
+    let choices = [
+        ("Turn left", Event::Turn(TURN_STEP)),
+        ("Turn right", Event::Turn(-TURN_STEP)),
+        ("Smaller", Event::Scale(1.0 / SCALE_STEP)),
+        ("Larger", Event::Scale(SCALE_STEP)),
+        ("Lift", Event::Cancel),
+    ];
+    let clicked = |(name, event)| button(ui, standing, name, name).clicked().then_some(event);
+    choices.into_iter().filter_map(clicked).collect()
 }
 
 /// "0:01.23 / 0:10.00 · frame 37 of 300 · clip frame 187"

@@ -4,19 +4,24 @@
 
 mod controls;
 mod keyboard;
+mod room_view;
 mod scene_view;
+
+pub use room_view::Room;
 
 use std::time::{Duration, Instant};
 
 use egui::{CentralPanel, Color32, Panel, RichText, Ui};
 use protocol::pitch::Pitch;
 
+use crate::placement::gesture::Placement;
 use crate::{
     camera::{OrbitCamera, Preset},
     session::Session,
     source::Location,
 };
 pub(crate) use controls::timeline as timeline_slider;
+use room_view::RoomView;
 use scene_view::SceneView;
 
 /// How the table is looked at.
@@ -34,6 +39,7 @@ pub struct PlayerApp {
     session: Session,
     view: Option<SceneView>,
     look: Look,
+    room: Option<RoomView>,
     started: Instant,
 }
 
@@ -47,8 +53,23 @@ impl PlayerApp {
             session,
             view: context.wgpu_render_state.clone().map(SceneView::new),
             look: Look::Preset(Preset::Table),
+            room: None,
             started: Instant::now(),
         }
+    }
+
+    /// Shows a recorded room instead of a table of its own; the match is placed in it with the mouse.
+    #[must_use]
+    pub fn in_room(mut self, context: &eframe::CreationContext<'_>, room: Room) -> Self {
+        let now = self.now();
+        self.room = Some(RoomView::new(context.wgpu_render_state.clone(), room, self.pitch(), now));
+        self
+    }
+
+    /// The state of placing, in a recorded room.
+    #[must_use]
+    pub fn placement(&self) -> Option<&Placement> {
+        self.room.as_ref().map(RoomView::placement)
     }
 
     /// What is being watched.
@@ -104,19 +125,37 @@ impl eframe::App for PlayerApp {
         let now = self.now();
         keyboard::apply(ui, &mut self.session, now);
         let changed = self.session.update(now);
-        if let (true, Some(view), Some(shown)) = (changed, &mut self.view, self.session.shown()) {
-            view.show_frame(&shown.scene);
+        if let (true, Some(shown)) = (changed, self.session.shown()) {
+            if let Some(room) = &mut self.room {
+                room.show_frame(&shown.scene);
+            } else if let Some(view) = &mut self.view {
+                view.show_frame(&shown.scene);
+            }
         }
         Panel::bottom("controls").show(ui, |ui| {
             ui.add_space(6.0);
             controls::timeline(ui, &mut self.session, now);
             controls::buttons(ui, &mut self.session, &mut self.look, now);
+            if let Some(room) = &mut self.room {
+                ui.horizontal(|ui| {
+                    let standing = room.placement().standing().is_some();
+                    for event in controls::placing(ui, standing) {
+                        room.handle(event, now);
+                    }
+                    ui.label(room.hint());
+                });
+            }
             let (status, colour) = self.status();
             ui.add(egui::Label::new(RichText::new(status).color(colour).small()).wrap());
             ui.add_space(4.0);
         });
         let pitch = self.pitch();
         CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| match &mut self.view {
+            _ if self.room.is_some() => {
+                if let Some(room) = &mut self.room {
+                    room.ui(ui, pitch, now);
+                }
+            }
             Some(view) => {
                 let camera = self.session.shown().and_then(|shown| shown.scene.camera);
                 view.ui(ui, &pitch, camera.as_ref(), &mut self.look);

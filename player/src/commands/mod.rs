@@ -5,6 +5,7 @@
 mod bench;
 mod inspect;
 mod place;
+mod place_picture;
 mod render;
 mod window;
 mod xr;
@@ -20,6 +21,7 @@ use tokio::runtime::Runtime;
 const EXAMPLES: &str = "Examples:
   player target/demo/stream
   player http://192.168.1.20:8080/
+  player target/demo/stream --scan room.pcd
   player render target/demo/stream --frame 0 --camera broadcast --size 1280x720 --out frame.png
   player inspect target/demo/stream
   player place --cloud scan.pcd --json table.json

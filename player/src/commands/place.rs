@@ -1,4 +1,4 @@
-//! `player place`: find the table in a scan of a room.
+//! `player place`: find the table in a scan of a room, and draw the match on it.
 
 use std::{
     path::{Path, PathBuf},
@@ -13,15 +13,23 @@ use player::{
 };
 use serde::{Deserialize, Serialize};
 
+use super::place_picture::{self, PictureArguments, PitchReport};
+
 const EXAMPLES: &str = "Examples:
   player place --cloud scan.pcd --json table.json
   player place --cloud phone.ply --up 0,1,0
   player place --depth depth.png --intrinsics 525,525,319.5,239.5
   player place --depth depth.pgm --depth-scale 5000 --intrinsics camera.json
+  player place --cloud scan.pcd --stream target/demo/stream --frame 30 --out table.png
+  player place --cloud scan.pcd --stream target/demo/stream --out left.png --view left
+  player place --depth 1.png --image colour.png --intrinsics 525,525,319.5,239.5 --stream STREAM --out table.png
+  player place --sequence room --intrinsics 518,519,325.5,253.5 --stream STREAM --out from-3.png --view 3
 
 Prints JSON: the table (or null) as a plane n·p + d = 0 in the axes of the scan, metres, n towards the sensor; its
 polygon; all planes; and for each level one that is not claimed, why. Exit code 0 also when there is no table.
-Without --up, gravity is estimated from the planes and from how the sensor was held.";
+Without --up, gravity is estimated from the planes and from how the sensor was held.
+With --stream and --out it also draws the match on the table: hidden by what stands in front, with a shadow, in the
+light of the picture.";
 
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -30,6 +38,8 @@ pub(super) struct PlaceArguments {
     scan: ScanArgument,
     #[command(flatten)]
     options: ScanOptions,
+    #[command(flatten)]
+    picture: PictureArguments,
     /// Write the JSON here instead of printing it.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -37,30 +47,33 @@ pub(super) struct PlaceArguments {
 
 #[derive(clap::Args)]
 #[group(required = true, multiple = false)]
-struct ScanArgument {
+pub(super) struct ScanArgument {
     /// A point cloud, in rows and columns or without order.
     #[arg(long, value_name = "FILE.pcd|.ply")]
-    cloud: Option<PathBuf>,
+    pub(super) cloud: Option<PathBuf>,
     /// A depth picture: 16 bits, distance along the optical axis.
     #[arg(long, value_name = "FILE.png|.pgm", requires = "intrinsics")]
-    depth: Option<PathBuf>,
+    pub(super) depth: Option<PathBuf>,
+    /// A folder with posed views: depth/, color/ and pose.txt or trajectory.log. The table is looked for in the first.
+    #[arg(long, value_name = "DIR", requires = "intrinsics")]
+    pub(super) sequence: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
-struct ScanOptions {
+pub(super) struct ScanOptions {
     /// Pinhole of the depth picture: fx,fy,cx,cy in pixels, or a JSON file with width, height and intrinsic_matrix.
     #[arg(long, value_name = "FX,FY,CX,CY|FILE", value_parser = parse_intrinsics)]
-    intrinsics: Option<IntrinsicsArgument>,
+    pub(super) intrinsics: Option<IntrinsicsArgument>,
     /// Units of the depth picture in a metre.
     #[arg(long, value_name = "UNITS", default_value_t = 1000.0, value_parser = parse_scale)]
-    depth_scale: f64,
+    pub(super) depth_scale: f64,
     /// Direction against gravity, in the axes of the scan.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_direction, allow_hyphen_values = true)]
-    up: Option<DVec3>,
+    pub(super) up: Option<DVec3>,
 }
 
 #[derive(Clone)]
-enum IntrinsicsArgument {
+pub(super) enum IntrinsicsArgument {
     Values(Intrinsics),
     File(PathBuf),
 }
@@ -109,6 +122,9 @@ fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
 /// What `--json` holds; metres in the axes of the scan.
 #[derive(Serialize)]
 struct Report<'a> {
+    /// Where the match stands, with --out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pitch: Option<PitchReport>,
     table: Option<PlaneReport<'a>>,
     planes: Vec<PlaneReport<'a>>,
     /// Level surfaces that are not claimed, and why.
@@ -165,7 +181,14 @@ impl<'a> PlaneReport<'a> {
 }
 
 pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
-    let cloud = read(&arguments.scan, &arguments.options)?;
+    let asked = arguments.picture.asked();
+    let (cloud, room) = match asked {
+        Some(_) => {
+            let room = place_picture::read(&arguments.scan, &arguments.options, &arguments.picture)?;
+            (room.found_in.cloud.clone(), Some(room))
+        }
+        None => (read(&arguments.scan, &arguments.options)?, None),
+    };
     let points = cloud.points_m().iter().filter(|point| point.is_finite()).count();
     if points == 0 {
         bail!("{}: no point was measured: scan again", arguments.scan.path().display());
@@ -180,7 +203,14 @@ pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
             find_wall_ms
         }
     };
+    let drawn = match (&room, asked) {
+        (Some(room), Some(asked)) => {
+            finding.table().map(|table| place_picture::draw(room, &table.surface, &asked))
+        }
+        _ => None,
+    };
     let report = Report {
+        pitch: drawn.transpose()?,
         table: finding.table().map(PlaneReport::new),
         planes: finding.surfaces.iter().map(PlaneReport::new).collect(),
         rejected: rejections(&finding),
@@ -189,13 +219,15 @@ pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
         find_ms,
         find_wall_ms,
     };
+    let nothing_drawn = asked.is_some() && report.pitch.is_none();
     match &arguments.json {
-        Some(path) => super::write_json(path, &report),
-        None => {
-            println!("{}", serde_json::to_string_pretty(&report)?);
-            Ok(())
-        }
+        Some(path) => super::write_json(path, &report)?,
+        None => println!("{}", serde_json::to_string_pretty(&report)?),
     }
+    if nothing_drawn {
+        bail!("{}: no table found, so there is no picture of one", arguments.scan.path().display());
+    }
+    Ok(())
 }
 
 fn rejections(finding: &Finding) -> Vec<Rejection> {
@@ -212,7 +244,8 @@ fn processor_ms() -> Option<f64> {
 
 impl ScanArgument {
     fn path(&self) -> &Path {
-        self.cloud.as_deref().or(self.depth.as_deref()).unwrap_or(Path::new(""))
+        let given = self.cloud.as_deref().or(self.depth.as_deref()).or(self.sequence.as_deref());
+        given.unwrap_or(Path::new(""))
     }
 }
 
@@ -223,7 +256,14 @@ fn read(scan: &ScanArgument, options: &ScanOptions) -> anyhow::Result<PointCloud
             let picture = scan::read_depth(path, 1.0 / options.depth_scale)?;
             PointCloud::from_depth(&picture, &intrinsics.read()?)
         }
-        _ => bail!("give --cloud, or --depth with --intrinsics"),
+        (None, None, Some(intrinsics)) => {
+            let folder = scan.sequence.as_deref().unwrap_or(Path::new(""));
+            let views = scan::read_sequence(folder)?;
+            let first = views.first().with_context(|| format!("{}: an empty sequence", folder.display()))?;
+            let picture = scan::read_depth(&first.depth, 1.0 / options.depth_scale)?;
+            PointCloud::from_depth(&picture, &intrinsics.read()?).moved(&first.room_from_camera)
+        }
+        _ => bail!("give --cloud, or --depth or --sequence with --intrinsics"),
     };
     if let Some(up) = options.up {
         cloud = cloud.with_up(up);
@@ -232,7 +272,7 @@ fn read(scan: &ScanArgument, options: &ScanOptions) -> anyhow::Result<PointCloud
 }
 
 impl IntrinsicsArgument {
-    fn read(&self) -> anyhow::Result<Intrinsics> {
+    pub(super) fn read(&self) -> anyhow::Result<Intrinsics> {
         let path = match self {
             Self::Values(intrinsics) => return Ok(*intrinsics),
             Self::File(path) => path,

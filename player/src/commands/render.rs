@@ -88,7 +88,11 @@ fn view(
 }
 
 /// The frame with an index in the stream. Frames may last unevenly, so chunks before it are opened to count theirs.
-fn find_frame(runtime: &Runtime, stream: &Stream, wanted: u32) -> anyhow::Result<(String, ChunkFrame)> {
+pub(super) fn find_frame(
+    runtime: &Runtime,
+    stream: &Stream,
+    wanted: u32,
+) -> anyhow::Result<(String, ChunkFrame)> {
     let mut first = 0_usize;
     for index in 0..stream.chunks().len() {
         let loaded = runtime.block_on(stream.chunk(index))?;

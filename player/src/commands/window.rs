@@ -1,7 +1,7 @@
 //! `player STREAM`: the desktop window, and the flags that let a script look at it.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
 };
 
@@ -9,7 +9,9 @@ use anyhow::{Context, anyhow};
 use eframe::{NativeOptions, Renderer};
 use egui::{ColorImage, ViewportBuilder, ViewportCommand};
 use player::{
-    app::PlayerApp,
+    app::{PlayerApp, Room},
+    placement::Finder,
+    scan::RecordedRoom,
     session::Session,
     source::{Location, loader::Loader},
 };
@@ -20,6 +22,12 @@ pub(super) struct WindowArguments {
     /// Folder of the stream, or its http:// address.
     #[arg(value_name = "STREAM|URL", required = true)]
     stream: Option<String>,
+    /// Show the match in this recorded room, a cloud with rows and colours, and place it there with the mouse.
+    #[arg(long, value_name = "FILE.pcd")]
+    scan: Option<PathBuf>,
+    /// The colour picture of the scan, when the cloud has no colours.
+    #[arg(long, value_name = "FILE.png|.jpg", requires = "scan")]
+    image: Option<PathBuf>,
     /// For scripts: close the window after this many frames of the match were shown.
     #[arg(long, value_name = "N")]
     exit_after_frames: Option<u32>,
@@ -36,6 +44,8 @@ pub(super) fn run(arguments: &WindowArguments) -> anyhow::Result<()> {
     {
         return Err(anyhow!("{text}: there is no such folder: give the folder that holds match.json"));
     }
+    let room =
+        arguments.scan.as_deref().map(|scan| read_room(scan, arguments.image.as_deref())).transpose()?;
     let outcome = Arc::new(Mutex::new(None));
     let script = arguments.exit_after_frames.map(|frames| Script {
         frames,
@@ -58,7 +68,10 @@ pub(super) fn run(arguments: &WindowArguments) -> anyhow::Result<()> {
     let build = move |context: &eframe::CreationContext<'_>| {
         let wake = context.egui_ctx.clone();
         let loader = Loader::start(location.clone(), Limits::default(), move || wake.request_repaint())?;
-        let app = PlayerApp::new(context, &location, Session::new(loader));
+        let mut app = PlayerApp::new(context, &location, Session::new(loader));
+        if let Some(room) = room {
+            app = app.in_room(context, room);
+        }
         Ok(Box::new(Window { app, script }) as Box<dyn eframe::App>)
     };
     eframe::run_native("holopitch-player", options, Box::new(build)).map_err(|error| {
@@ -68,6 +81,17 @@ pub(super) fn run(arguments: &WindowArguments) -> anyhow::Result<()> {
     })?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
     outcome.unwrap_or(Ok(()))
+}
+
+/// A scan with the surfaces that are found in it.
+fn read_room(scan: &Path, image: Option<&Path>) -> anyhow::Result<Room> {
+    let recorded = RecordedRoom::from_cloud(scan, image)?;
+    let finding = Finder::default().find(&recorded.cloud);
+    let surfaces: Vec<_> = finding.surfaces.into_iter().map(|found| found.surface).collect();
+    if surfaces.is_empty() {
+        tracing::warn!("{}: no surface was found, so the match cannot be placed", scan.display());
+    }
+    Ok(Room { picture: recorded.picture, surfaces, up: finding.up.direction })
 }
 
 type Outcome = Arc<Mutex<Option<anyhow::Result<()>>>>;

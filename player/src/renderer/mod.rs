@@ -6,9 +6,11 @@
 mod atlas;
 mod buffers;
 mod pipelines;
+mod real_table;
 mod target;
 mod view;
 
+pub use real_table::{OnTable, RealTable};
 pub use target::{Canvas, PictureFormat, Surroundings, Target};
 pub use view::View;
 
@@ -16,8 +18,9 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages, Color,
-    CommandEncoder, Device, LoadOp, Operations, PipelineLayoutDescriptor, Queue, RenderPassColorAttachment,
-    RenderPassDepthStencilAttachment, RenderPassDescriptor, ShaderStages, StoreOp, TextureFormat,
+    CommandEncoder, Device, LoadOp, Operations, PipelineLayoutDescriptor, Queue, RenderPass,
+    RenderPassColorAttachment, RenderPassDepthStencilAttachment, RenderPassDescriptor, ShaderStages, StoreOp,
+    TextureFormat,
 };
 
 use crate::{
@@ -57,6 +60,7 @@ pub struct Renderer {
     format: PictureFormat,
     pipelines: Pipelines,
     view: Buffer,
+    scene_layout: BindGroupLayout,
     scene: BindGroup,
     atlas_layout: BindGroupLayout,
     atlas: AtlasTexture,
@@ -137,6 +141,7 @@ impl Renderer {
             format,
             pipelines,
             view,
+            scene_layout,
             scene,
             atlas: AtlasTexture::white(device, queue, &atlas_layout),
             atlas_layout,
@@ -204,21 +209,31 @@ impl Renderer {
             pass.set_pipeline(&self.pipelines.backdrop);
             pass.draw(0..3, 0..1);
         }
+        self.draw_ground(&mut pass);
+        self.draw_upright(&mut pass);
+    }
+
+    /// What lies: turf, table and contact shadows. The scene's bind group must be set.
+    fn draw_ground(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.pipelines.ground);
-        self.ground.draw(&mut pass);
+        self.ground.draw(pass);
         if self.shadow_count > 0 {
             pass.set_pipeline(&self.pipelines.shadow);
             pass.set_vertex_buffer(0, self.shadows.buffer().slice(..));
             pass.draw(0..4, 0..self.shadow_count);
         }
+    }
+
+    /// What stands: goals, ball, people, and last the nets, which let through what is behind them.
+    fn draw_upright(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.pipelines.solid);
-        self.fixtures.draw(&mut pass);
-        self.ball.draw(&mut pass);
+        self.fixtures.draw(pass);
+        self.ball.draw(pass);
         pass.set_pipeline(&self.pipelines.body);
         pass.set_bind_group(1, self.atlas.bind_group(), &[]);
-        self.bodies.draw(&mut pass);
+        self.bodies.draw(pass);
         pass.set_pipeline(&self.pipelines.net);
-        self.nets.draw(&mut pass);
+        self.nets.draw(pass);
     }
 }
 

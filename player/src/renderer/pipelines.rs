@@ -26,23 +26,27 @@ pub(super) struct Pipelines {
 
 /// How a pipeline treats what is already in the picture.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Mixing {
+pub(super) enum Mixing {
     /// Behind everything, no depth.
     Background,
     /// Hides what is farther.
     Opaque,
     /// Tints what is farther, hides nothing.
     Transparent,
+    /// Tints what is farther and keeps its depth.
+    TransparentWithDepth,
+    /// Leaves its depth and no colour.
+    DepthOnly,
 }
 
-struct Kind<'a> {
-    name: &'a str,
-    shader: &'a str,
-    mixing: Mixing,
-    topology: PrimitiveTopology,
-    step_mode: VertexStepMode,
-    stride: usize,
-    attributes: &'a [VertexAttribute],
+pub(super) struct Kind<'a> {
+    pub(super) name: &'a str,
+    pub(super) shader: &'a str,
+    pub(super) mixing: Mixing,
+    pub(super) topology: PrimitiveTopology,
+    pub(super) step_mode: VertexStepMode,
+    pub(super) stride: usize,
+    pub(super) attributes: &'a [VertexAttribute],
 }
 
 impl Pipelines {
@@ -134,7 +138,12 @@ pub(super) fn multiview_mask(views: u32) -> Option<NonZeroU32> {
     NonZeroU32::new((1 << views) - 1).filter(|_| views > 1)
 }
 
-fn build(device: &Device, format: PictureFormat, layout: &PipelineLayout, kind: &Kind<'_>) -> RenderPipeline {
+pub(super) fn build(
+    device: &Device,
+    format: PictureFormat,
+    layout: &PipelineLayout,
+    kind: &Kind<'_>,
+) -> RenderPipeline {
     let source = format!("{COMMON}\n{}", kind.shader);
     let source = if format.views > 1 { for_two_views(&source) } else { source };
     let module = device.create_shader_module(ShaderModuleDescriptor {
@@ -160,11 +169,11 @@ fn build(device: &Device, format: PictureFormat, layout: &PipelineLayout, kind: 
         primitive: PrimitiveState { topology: kind.topology, cull_mode: None, ..Default::default() },
         depth_stencil: Some(DepthStencilState {
             format: DEPTH_FORMAT,
-            depth_write_enabled: Some(kind.mixing == Mixing::Opaque),
+            depth_write_enabled: Some(!matches!(kind.mixing, Mixing::Background | Mixing::Transparent)),
             // Reversed depth: nearer is larger.
             depth_compare: Some(match kind.mixing {
                 Mixing::Background => CompareFunction::Always,
-                Mixing::Opaque | Mixing::Transparent => CompareFunction::GreaterEqual,
+                _ => CompareFunction::GreaterEqual,
             }),
             stencil: Default::default(),
             bias: Default::default(),
@@ -176,8 +185,13 @@ fn build(device: &Device, format: PictureFormat, layout: &PipelineLayout, kind: 
             compilation_options: Default::default(),
             targets: &[Some(ColorTargetState {
                 format: format.colour,
-                blend: (kind.mixing == Mixing::Transparent).then_some(BlendState::ALPHA_BLENDING),
-                write_mask: ColorWrites::ALL,
+                blend: matches!(kind.mixing, Mixing::Transparent | Mixing::TransparentWithDepth)
+                    .then_some(BlendState::ALPHA_BLENDING),
+                write_mask: if kind.mixing == Mixing::DepthOnly {
+                    ColorWrites::empty()
+                } else {
+                    ColorWrites::ALL
+                },
             })],
         }),
         multiview_mask: multiview_mask(format.views),

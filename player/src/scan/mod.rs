@@ -8,6 +8,7 @@ mod lzf;
 mod pcd;
 mod ply;
 mod poses;
+mod room;
 
 use std::path::Path;
 
@@ -18,6 +19,7 @@ use crate::placement::PointCloud;
 pub use depth::read_depth;
 pub use error::ScanError;
 pub use poses::read_poses;
+pub use room::{RecordedRoom, RoomError, SequenceView, read_sequence};
 
 /// Most points of a cloud.
 pub const MOST_POINTS: usize = 50_000_000;

@@ -1,6 +1,6 @@
 //! Point Cloud Data files of the Point Cloud Library, version 0.7: ascii, binary and binary_compressed.
 //!
-//! Only `x`, `y`, `z` are kept, found by name. The format: <https://pointclouds.org/documentation/tutorials/pcd_file_format.html>.
+//! `x`, `y`, `z` are kept, found by name, and the colours of clouds that have them. The format: <https://pointclouds.org/documentation/tutorials/pcd_file_format.html>.
 
 use glam::{DVec3, Vec3};
 
@@ -73,6 +73,39 @@ pub(super) fn read(bytes: &[u8]) -> Result<PointCloud, Problem> {
         PointCloud::unorganised(points)
     };
     Ok(cloud.seen_from(header.viewpoint))
+}
+
+/// The colours of the points, sRGB, in the order of the points; `None` without a field `rgba` or `rgb`, and in ascii files.
+pub(super) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 4]>>, Problem> {
+    let mut reader = Reader::new(bytes);
+    let header = header(&mut reader)?;
+    let count = header.width.saturating_mul(header.height);
+    let is_colour = |field: &Field| matches!(field.name.as_str(), "rgba" | "rgb") && field.size() == 4;
+    let Some(at) = header.fields.iter().position(is_colour) else { return Ok(None) };
+    let record = header.fields.iter().map(Field::size).sum::<usize>();
+    let (body, start, step) = match header.data.as_str() {
+        "binary" => {
+            let body = reader.take(record.saturating_mul(count))?;
+            (std::borrow::Cow::Borrowed(body), offset(&header.fields, at, 1), record)
+        }
+        "binary_compressed" => {
+            let packed = reader.scalar(Scalar::U32, Endian::Little)? as usize;
+            let size = reader.scalar(Scalar::U32, Endian::Little)? as usize;
+            if size != record.saturating_mul(count) {
+                let problem = format!("{size} bytes announced, {count} points of {record} bytes expected");
+                return Err(Problem::at(format!("byte {}", reader.position() - 4), problem));
+            }
+            let body = lzf::expand(reader.take(packed)?, size)?;
+            (body.into(), offset(&header.fields, at, count), 4)
+        }
+        _ => return Ok(None),
+    };
+    let colour = |index: usize| match body.get(start + index * step..) {
+        // The bytes of 0x00RRGGBB, the lowest first.
+        Some([blue, green, red, ..]) => Ok([*red, *green, *blue, 255]),
+        _ => Err(Problem::at(format!("point {index}"), "missing")),
+    };
+    (0..count).map(colour).collect::<Result<_, _>>().map(Some)
 }
 
 fn header(reader: &mut Reader<'_>) -> Result<Header, Problem> {

@@ -77,14 +77,25 @@ impl Stage {
     #[must_use]
     pub fn new(pitch: Pitch) -> Self {
         let layout = Layout::around(pitch);
-        let mut ground = GroundMesh::default();
+        let mut table = GroundMesh::default();
         let table_top_m = -TURF_THICKNESS_M as f32;
-        ground.add_slab(
+        table.add_slab(
             &rounded_rectangle(layout.half_table_m, layout.table_corner_m, 12),
             table_top_m,
             layout.table_thickness_m as f32,
             [Material::Wood, Material::WoodEdge],
         );
+        Self::around(pitch, layout, table)
+    }
+
+    /// The stage of a pitch that stands on a real table: no table of its own.
+    #[must_use]
+    pub fn on_real_table(pitch: Pitch) -> Self {
+        Self::around(pitch, Layout::around(pitch), GroundMesh::default())
+    }
+
+    /// Turf, goals and markings on what is there already.
+    fn around(pitch: Pitch, layout: Layout, mut ground: GroundMesh) -> Self {
         ground.add_slab(
             &rounded_rectangle(layout.half_turf_m, layout.turf_corner_m, 10),
             0.0,
@@ -159,6 +170,14 @@ mod tests {
             let normal = Vec3::from(ground.vertices[triangle[0] as usize].normal);
             assert!(facing.dot(normal) > 0.0, "triangle {triangle:?} faces {facing}, normal {normal}");
         }
+    }
+
+    #[test]
+    fn on_a_real_table_nothing_lies_under_the_turf() {
+        let stage = Stage::on_real_table(Pitch::default());
+        let thickness = TURF_THICKNESS_M as f32;
+        assert!(stage.ground.vertices.iter().all(|vertex| vertex.position_m[1] >= -thickness - 1e-6));
+        assert!(stage.ground.vertices.iter().all(|vertex| vertex.material <= Material::TurfEdge as u32));
     }
 
     #[test]
