@@ -9,7 +9,7 @@ const MOST_PX: usize = 40;
 
 /// Fills holes in place. Depth in rows of `columns`, metres along the optical axis; what is not positive is a hole.
 pub(super) fn fill(depth_m: &mut [f32], columns: usize) {
-    if columns == 0 || depth_m.len() % columns != 0 {
+    if columns == 0 || !depth_m.len().is_multiple_of(columns) {
         return;
     }
     let rows = depth_m.len() / columns;

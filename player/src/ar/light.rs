@@ -239,7 +239,7 @@ impl Shading {
         });
         let (explained, towards, gain, mean_facing) =
             tried.filter(|(_, _, gain, _)| *gain > 0.0).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        if !(explained > LEAST_EXPLAINED) {
+        if explained.is_nan() || explained <= LEAST_EXPLAINED {
             return None;
         }
         // Of the mean luminance, 1, this much does not come from the light.
