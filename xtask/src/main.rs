@@ -5,6 +5,7 @@
 mod bench;
 mod dataset;
 mod demo;
+mod openxr;
 mod process;
 mod setup;
 mod test;
@@ -23,7 +24,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Install what is missing: system packages by apt, ONNX Runtime pinned by its hash, the glTF validator
+    /// Install what is missing: system packages by apt, ONNX Runtime pinned by its hash, the glTF validator, an OpenXR runtime for tests
     Setup,
     /// Reconstruct the shipped clip into target/demo/stream, draw pictures of it, open the player
     Demo {

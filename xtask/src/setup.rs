@@ -13,6 +13,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 
 use crate::{
+    openxr,
     process::{cargo, on_path, output, run, run_command},
     root,
 };
@@ -65,6 +66,12 @@ const TEST: &[Requirement] = &[
     },
 ];
 
+/// What making the headset's test runtime needs (see `openxr`).
+const HEADSET: &[Requirement] = &[
+    Requirement { probe: Probe::Program("debootstrap"), packages: &["debootstrap"] },
+    Requirement { probe: Probe::Program("bwrap"), packages: &["bubblewrap"] },
+];
+
 /// ONNX Runtime: version and SHA-256 of the wheel that holds the library.
 const ONNX_RUNTIME: (&str, &str) =
     ("1.31.1", "5752bd508126ae7c49894d3b9d2e83f0c3d487319246d04c444b393308d7ad7f");
@@ -82,7 +89,13 @@ pub(crate) fn to_run() -> Result<()> {
 pub(crate) fn everything() -> Result<()> {
     to_run()?;
     install(TEST)?;
-    gltf_validator()
+    gltf_validator()?;
+    openxr::folder().map(|_| ())
+}
+
+/// The tools that make the folder of the headset's test runtime and run programs in it.
+pub(crate) fn install_headset_tools() -> Result<()> {
+    install(HEADSET)
 }
 
 /// Environment of the programs that xtask starts: where the downloaded library is, and software Vulkan for tests.

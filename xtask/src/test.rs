@@ -3,6 +3,7 @@
 use anyhow::Result;
 
 use crate::{
+    openxr,
     process::{cargo, output, run_command},
     root, setup,
 };
@@ -20,10 +21,13 @@ pub(crate) fn run() -> Result<()> {
 
 /// `cargo test` on software Vulkan, with every optional tool required: here nothing may skip for want of one.
 fn tests() -> Result<()> {
-    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
+    // The headset's tests put this OpenXR layer between the player and the runtime.
+    cargo(&["build", "--package", "fakeplanes"])?;
+    let program = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     run_command(
-        std::process::Command::new(cargo)
+        std::process::Command::new(program)
             .args(["test", "--workspace"])
+            .envs(openxr::folder()?.map(|folder| ("HOLOPITCH_OPENXR_ROOT", folder)))
             .envs(setup::environment())
             .env("VK_DRIVER_FILES", setup::software_vulkan()?)
             .env("HOLOPITCH_REQUIRE_TOOLS", "1")

@@ -18,6 +18,7 @@ use super::{
     headset::{Headset, VIEWS},
     input::{Input, profile_in_use},
     lifecycle::{Action, Lifecycle},
+    panel::Panel,
     panel_layer::PanelLayer,
     planes::RuntimePlanes,
     room,
@@ -89,6 +90,8 @@ impl Connection {
         figures.samples = options.samples;
         figures.plane_source = planes.as_ref().map_or("none", |planes| planes.name()).to_owned();
         figures.sessions += 1;
+        // The new session's pictures know nothing of the letters that the old one's had.
+        show.panel = Panel::default();
         show.panel_stale = true;
         Ok(Self {
             eyes: None,
@@ -119,6 +122,10 @@ impl Connection {
             }
             if !self.life.is_running() {
                 show.player.update(show.now());
+                if show.player.manifest().is_some() {
+                    // Compiling shaders takes a while: better now than in a frame.
+                    self.prepare(show, options, false)?;
+                }
                 thread::sleep(IDLE);
                 continue;
             }
@@ -213,7 +220,11 @@ impl Connection {
 
     /// What the match stands on: without a view of the room also a table top.
     pub(super) fn stage(&self, show: &Show) -> Stage {
-        Stage::new(show.pitch())
+        if self.headset.mixing.sees_room() {
+            Stage::on_real_table(show.pitch())
+        } else {
+            Stage::new(show.pitch())
+        }
     }
 
     /// Mistakes that the graphics library has found so far.

@@ -164,7 +164,12 @@ impl Connection {
     }
 
     /// Builds what needs the stream's pitch, and uploads the frame on show.
-    fn prepare(&mut self, show: &mut Show, options: &XrOptions, changed: bool) -> Result<(), XrError> {
+    pub(super) fn prepare(
+        &mut self,
+        show: &mut Show,
+        options: &XrOptions,
+        changed: bool,
+    ) -> Result<(), XrError> {
         if self.eyes.is_none() {
             let scaled = |recommended: u32, most: u32| {
                 ((f64::from(recommended) * options.resolution_scale).round() as u32).clamp(1, most.max(1))

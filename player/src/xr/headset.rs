@@ -134,7 +134,6 @@ fn wanted(offered: &ExtensionSet) -> ExtensionSet {
     enabled.ext_plane_detection = offered.ext_plane_detection;
     enabled.ext_user_presence = offered.ext_user_presence;
     enabled.fb_passthrough = offered.fb_passthrough;
-    enabled.msft_spatial_anchor = offered.msft_spatial_anchor;
     enabled
 }
 

@@ -248,6 +248,58 @@ mod tests {
         TabletopPose::upright(DVec3::new(0.0, 0.75, -1.0), DVec3::Y, DVec3::X, 0.01)
     }
 
+    fn watching() -> (tempfile::TempDir, Session) {
+        use crate::source::{Location, loader::Loader};
+        let folder = tempfile::tempdir().unwrap();
+        let stream = protocol::sample::match_of(40, 4).unwrap();
+        for (path, bytes) in &stream.files {
+            let path = folder.path().join(path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, bytes).unwrap();
+        }
+        let manifest = folder.path().join(protocol::manifest::FILE_NAME);
+        std::fs::write(manifest, stream.manifest.to_json().unwrap()).unwrap();
+        let location = Location::parse(folder.path().to_str().unwrap()).unwrap();
+        let loader = Loader::start(location, protocol::limits::Limits::default(), || {}).unwrap();
+        let mut session = Session::new(loader);
+        while session.shown().is_none() {
+            session.update(Duration::ZERO);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        (folder, session)
+    }
+
+    /// A ray that presses everywhere along the buttons plays, changes the speed and follows; one on the slider scrubs.
+    #[test]
+    fn every_button_can_be_pressed_by_a_ray() {
+        let (_folder, mut session) = watching();
+        let (mut panel, mut follow) = (Panel::default(), false);
+        let (mut played, mut followed, mut speeds) = (false, false, std::collections::BTreeSet::new());
+        let mut time = Duration::ZERO;
+        let mut press = |session: &mut Session, follow: &mut bool, x: f32, y: f32| {
+            for pressed in [false, true, false] {
+                time += Duration::from_millis(300);
+                let pointer = PanelPointer { at: Some(pos2(x, y)), pressed };
+                panel.run(session, follow, pointer, time).drop_without_applying_deltas();
+                session.update(time);
+            }
+        };
+        let size = size_points();
+        for x in (0..size.x as u32).step_by(12) {
+            press(&mut session, &mut follow, x as f32, size.y - 40.0);
+            played |= session.is_playing();
+            followed |= follow;
+            speeds.insert(session.speed().as_percent());
+        }
+        assert!(played && followed, "played {played}, followed {followed}");
+        assert_eq!(speeds.into_iter().collect::<Vec<_>>(), SPEEDS);
+        let before = session.position();
+        for y in (30..100).step_by(5) {
+            press(&mut session, &mut follow, size.x * 0.7, y as f32);
+        }
+        assert!(session.position() != before, "the slider scrubs");
+    }
+
     #[test]
     fn it_stands_between_the_match_and_the_viewer_and_stays_while_he_leans() {
         let viewer = DVec3::new(0.0, 1.6, 0.3);

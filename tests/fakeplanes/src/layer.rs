@@ -12,7 +12,7 @@ use openxr_sys::{
     SystemId, SystemPlaneDetectionPropertiesEXT, SystemProperties, pfn,
 };
 
-use crate::planes;
+use crate::{planes, planted};
 
 /// The layer or runtime below; made anew with every instance.
 static BELOW: RwLock<Option<pfn::GetInstanceProcAddr>> = RwLock::new(None);
@@ -26,7 +26,10 @@ pub(crate) fn set_below(below: pfn::GetInstanceProcAddr) {
 }
 
 /// A function of the layer below.
-unsafe fn below(instance: Instance, name: *const c_char) -> (Result, Option<pfn::VoidFunction>) {
+///
+/// # Safety
+/// `instance` is live, or null for the functions that need none; `name` is a C string.
+pub(crate) unsafe fn below(instance: Instance, name: *const c_char) -> (Result, Option<pfn::VoidFunction>) {
     let Some(get) = BELOW.read().ok().and_then(|slot| *slot) else {
         return (Result::ERROR_HANDLE_INVALID, None);
     };
@@ -63,6 +66,12 @@ pub(crate) unsafe extern "system" fn get_instance_proc_addr(
                 Some(transmute::<pfn::GetPlanePolygonBufferEXT, _>(planes::outline))
             }
             b"xrGetSystemProperties" => Some(transmute::<pfn::GetSystemProperties, _>(system_properties)),
+            b"xrCreateVulkanInstanceKHR" => {
+                Some(transmute::<pfn::CreateVulkanInstanceKHR, _>(planted::create_instance))
+            }
+            b"xrCreateVulkanDeviceKHR" => {
+                Some(transmute::<pfn::CreateVulkanDeviceKHR, _>(planted::create_device))
+            }
             b"xrWaitFrame" => Some(transmute::<pfn::WaitFrame, _>(wait_frame)),
             _ => None,
         }

@@ -3,12 +3,13 @@
 //! The loader puts it between a program and the runtime (`manifest` in `tests/tests/headset/`). It answers the extension's
 //! functions itself, says in the system's properties that planes are detected, hides the extension from the runtime below,
 //! and passes everything else on. While the file named by `FAKEPLANES_LOSE_SESSION` exists, `xrWaitFrame` reports a lost
-//! session once and removes the file.
+//! session once and removes the file. `FAKEPLANES_PLANT_VULKAN_ERROR` makes it misuse Vulkan once.
 
 #![allow(unsafe_code)] // an API layer is nothing but foreign functions; each says what its caller guarantees
 
 mod layer;
 mod planes;
+mod planted;
 
 use std::{ffi::c_char, ptr};
 
