@@ -20,7 +20,13 @@ fn error_line(output: &Output) -> String {
 
 #[test]
 fn help_has_an_example_for_every_command() {
-    for command in [&["--help"][..], &["render", "--help"], &["inspect", "--help"], &["bench", "--help"]] {
+    for command in [
+        &["--help"][..],
+        &["render", "--help"],
+        &["inspect", "--help"],
+        &["bench", "--help"],
+        &["xr", "--help"],
+    ] {
         let output = player(command);
         assert_eq!(output.status.code(), Some(0), "{command:?}");
         assert!(String::from_utf8_lossy(&output.stdout).contains("Examples:"), "{command:?}");
@@ -54,6 +60,24 @@ fn a_stream_that_is_not_there_is_one_line_and_exit_code_1() {
         let address = arguments.last().unwrap();
         assert!(line.contains(address), "{line}");
     }
+}
+
+#[test]
+fn a_machine_without_a_headset_is_one_line_and_exit_code_1() {
+    let folder = tempfile::tempdir().unwrap();
+    support::write_match(folder.path(), 5);
+    let output = Command::new(env!("CARGO_BIN_EXE_player"))
+        .args(["xr", folder.path().to_str().unwrap()])
+        .env("XR_RUNTIME_JSON", folder.path().join("no-runtime.json"))
+        .env("XR_LOADER_DEBUG", "none")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let line = error_line(&output);
+    assert!(
+        line.contains("OpenXR") && line.contains("install") || line.contains("XR_RUNTIME_JSON"),
+        "{line}"
+    );
 }
 
 #[test]

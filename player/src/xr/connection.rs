@@ -11,6 +11,8 @@ use openxr::{
     Vulkan,
 };
 
+use protocol::pitch::Pitch;
+
 use super::{
     XrError,
     eyes::Eyes,
@@ -47,6 +49,8 @@ pub(super) enum Ended {
 /// A headset with a session on it. Fields are dropped in this order: what hangs on the session before the session.
 pub(super) struct Connection {
     pub(super) eyes: Option<Eyes>,
+    /// The pitch that the eyes' pictures were built for.
+    pub(super) pitch: Pitch,
     pub(super) panel: PanelLayer,
     pub(super) camera_picture: Option<CameraPicture>,
     pub(super) planes: Option<RuntimePlanes>,
@@ -95,6 +99,7 @@ impl Connection {
         show.panel_stale = true;
         Ok(Self {
             eyes: None,
+            pitch: show.pitch(),
             panel,
             camera_picture,
             planes,
@@ -116,16 +121,14 @@ impl Connection {
     /// Shows the match until the session ends.
     pub(super) fn show(&mut self, show: &mut Show, options: &XrOptions) -> Result<Ended, XrError> {
         let begun = Instant::now();
+        // Compiling shaders takes a while: better now than in a frame.
+        self.prepare(show, options, false)?;
         loop {
             if let Some(ended) = self.take_events(show)? {
                 return Ok(ended);
             }
             if !self.life.is_running() {
                 show.player.update(show.now());
-                if show.player.manifest().is_some() {
-                    // Compiling shaders takes a while: better now than in a frame.
-                    self.prepare(show, options, false)?;
-                }
                 thread::sleep(IDLE);
                 continue;
             }

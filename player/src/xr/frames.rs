@@ -163,14 +163,19 @@ impl Connection {
         changed
     }
 
-    /// Builds what needs the stream's pitch, and uploads the frame on show.
+    /// Builds the eyes' pictures, again when the stream's pitch turns out to be another, and uploads the frame on show.
     pub(super) fn prepare(
         &mut self,
         show: &mut Show,
         options: &XrOptions,
         changed: bool,
     ) -> Result<(), XrError> {
-        if self.eyes.is_none() {
+        let pitch = show.pitch();
+        if self.eyes.is_none() || self.pitch != pitch {
+            self.pitch = pitch;
+            self.uploaded = false;
+            // The GPU may still draw into the pictures that are about to go.
+            let _ = self.graphics.device.poll(wgpu::PollType::wait_indefinitely());
             let scaled = |recommended: u32, most: u32| {
                 ((f64::from(recommended) * options.resolution_scale).round() as u32).clamp(1, most.max(1))
             };
