@@ -1,6 +1,7 @@
 //! `player place`: find the table in a scan of a room, and draw the match on it.
 
 use std::{
+    io::Write,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -222,7 +223,8 @@ pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
     let nothing_drawn = asked.is_some() && report.pitch.is_none();
     match &arguments.json {
         Some(path) => super::write_json(path, &report)?,
-        None => println!("{}", serde_json::to_string_pretty(&report)?),
+        None => writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&report)?)
+            .context("standard output: cannot be written")?,
     }
     if nothing_drawn {
         bail!("{}: no table found, so there is no picture of one", arguments.scan.path().display());

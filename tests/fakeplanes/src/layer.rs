@@ -51,28 +51,34 @@ pub(crate) unsafe extern "system" fn get_instance_proc_addr(
     // SAFETY: a function pointer is turned into the untyped one that OpenXR hands out; its user turns it back.
     let ours: Option<pfn::VoidFunction> = unsafe {
         match text.to_bytes() {
-            b"xrCreatePlaneDetectorEXT" => Some(transmute::<pfn::CreatePlaneDetectorEXT, _>(planes::create)),
-            b"xrDestroyPlaneDetectorEXT" => {
-                Some(transmute::<pfn::DestroyPlaneDetectorEXT, _>(planes::destroy))
+            b"xrCreatePlaneDetectorEXT" => {
+                Some(transmute::<pfn::CreatePlaneDetectorEXT, pfn::VoidFunction>(planes::create))
             }
-            b"xrBeginPlaneDetectionEXT" => Some(transmute::<pfn::BeginPlaneDetectionEXT, _>(planes::begin)),
+            b"xrDestroyPlaneDetectorEXT" => {
+                Some(transmute::<pfn::DestroyPlaneDetectorEXT, pfn::VoidFunction>(planes::destroy))
+            }
+            b"xrBeginPlaneDetectionEXT" => {
+                Some(transmute::<pfn::BeginPlaneDetectionEXT, pfn::VoidFunction>(planes::begin))
+            }
             b"xrGetPlaneDetectionStateEXT" => {
-                Some(transmute::<pfn::GetPlaneDetectionStateEXT, _>(planes::state))
+                Some(transmute::<pfn::GetPlaneDetectionStateEXT, pfn::VoidFunction>(planes::state))
             }
             b"xrGetPlaneDetectionsEXT" => {
-                Some(transmute::<pfn::GetPlaneDetectionsEXT, _>(planes::detections))
+                Some(transmute::<pfn::GetPlaneDetectionsEXT, pfn::VoidFunction>(planes::detections))
             }
             b"xrGetPlanePolygonBufferEXT" => {
-                Some(transmute::<pfn::GetPlanePolygonBufferEXT, _>(planes::outline))
+                Some(transmute::<pfn::GetPlanePolygonBufferEXT, pfn::VoidFunction>(planes::outline))
             }
-            b"xrGetSystemProperties" => Some(transmute::<pfn::GetSystemProperties, _>(system_properties)),
+            b"xrGetSystemProperties" => {
+                Some(transmute::<pfn::GetSystemProperties, pfn::VoidFunction>(system_properties))
+            }
             b"xrCreateVulkanInstanceKHR" => {
-                Some(transmute::<pfn::CreateVulkanInstanceKHR, _>(planted::create_instance))
+                Some(transmute::<pfn::CreateVulkanInstanceKHR, pfn::VoidFunction>(planted::create_instance))
             }
             b"xrCreateVulkanDeviceKHR" => {
-                Some(transmute::<pfn::CreateVulkanDeviceKHR, _>(planted::create_device))
+                Some(transmute::<pfn::CreateVulkanDeviceKHR, pfn::VoidFunction>(planted::create_device))
             }
-            b"xrWaitFrame" => Some(transmute::<pfn::WaitFrame, _>(wait_frame)),
+            b"xrWaitFrame" => Some(transmute::<pfn::WaitFrame, pfn::VoidFunction>(wait_frame)),
             _ => None,
         }
     };
