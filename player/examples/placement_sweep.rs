@@ -199,7 +199,7 @@ fn chart(
         let (value, high) = (last * share, most * share);
         writeln!(
             svg,
-            "<text x=\"{x}\" y=\"{}\" text-anchor=\"middle\" fill=\"#666\">{value:.4}</text>",
+            "<text x=\"{x}\" y=\"{}\" text-anchor=\"middle\" fill=\"#666\">{value}</text>",
             bottom + 13.0
         )?;
         writeln!(

@@ -45,7 +45,10 @@ const LEAST_EDGE_SHARE: f64 = 0.2;
 /// Points below a surface and beside it, as a share of its own, that show it to be raised.
 const LEAST_BELOW_SHARE: f64 = 0.02;
 
-/// The same for points without order, where no picture shows that they lie beyond an edge: more than wild points make up.
+/// Share of the boundary beyond which something flat and lower is seen, with them.
+const LEAST_DROPS: f64 = 0.1;
+
+/// Points below as a share for clouds without order, where no picture shows that they lie beyond an edge: more than wild points make up.
 const LEAST_BELOW_SHARE_SCATTERED: f64 = 0.08;
 
 /// Why a level or nearly level surface is not claimed as a place to stand on.
@@ -125,7 +128,7 @@ impl Piece {
     /// Whether something shows that the piece does not lie on the ground.
     fn is_seen_raised(&self, below_sensor_m: f64) -> bool {
         let is_above_others = match self.edges {
-            Some(edges) => self.footprint.below_share > LEAST_BELOW_SHARE && edges.drops > 0.05,
+            Some(edges) => self.footprint.below_share > LEAST_BELOW_SHARE && edges.drops > LEAST_DROPS,
             None => self.footprint.below_share > LEAST_BELOW_SHARE_SCATTERED,
         };
         if is_above_others {
@@ -172,15 +175,17 @@ pub(super) fn classify(pieces: &[Piece], up: Up, viewpoint: DVec3) -> Vec<Verdic
             }
             let kind = match height_m {
                 Some(height_m) if height_m < 0.08 => {
-                    let refusal =
-                        if alone && up.source != UpSource::Given && eye_m - level_m < EYES_OVER_TABLE_M {
-                            Refusal::NotSeenRaised {
-                                edge_share: piece.edges.map_or(0.0, |edges| edges.free_share()),
-                                below_sensor_m: eye_m - level_m,
-                            }
-                        } else {
-                            Refusal::Floor
-                        };
+                    let refusal = if alone
+                        && !matches!(up.source, UpSource::Given)
+                        && eye_m - level_m < EYES_OVER_TABLE_M
+                    {
+                        Refusal::NotSeenRaised {
+                            edge_share: piece.edges.map_or(0.0, |edges| edges.free_share()),
+                            below_sensor_m: eye_m - level_m,
+                        }
+                    } else {
+                        Refusal::Floor
+                    };
                     return verdict(SurfaceKind::Floor, Some(refusal));
                 }
                 Some(height_m) if height_m < HEIGHTS_M[0] => {
@@ -229,7 +234,7 @@ pub(super) fn confidence(piece: &Piece, verdict: &Verdict, up: Up) -> f64 {
     let cover = (0.5 + 0.5 * footprint.measured_share / footprint.free_share.max(0.1)).clamp(0.0, 1.0);
     let level = match up.source {
         UpSource::Given => 1.0,
-        UpSource::Planes => 0.9,
+        UpSource::Planes | UpSource::Axis => 0.9,
         UpSource::Picture => 0.5,
     };
     let height = if verdict.height_m.is_some() { 1.0 } else { 0.9 };

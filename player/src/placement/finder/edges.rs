@@ -62,10 +62,12 @@ impl EdgeView {
             }
             for neighbour in grid.neighbours(index) {
                 if outside.get(neighbour).copied().unwrap_or(false) {
-                    match grid.beyond(index, neighbour, LOOK_AHEAD).and_then(distance) {
-                        Some(distance) if distance < -1.0 => view.drops += 1.0,
-                        Some(_) => view.rises += 1.0,
-                        None => view.open += 1.0,
+                    let next = grid.beyond(index, neighbour, LOOK_AHEAD);
+                    match next.and_then(|next| distance(next).map(|distance| (next, distance))) {
+                        // Wild points lie behind the surface too, but not on a plane.
+                        Some((next, distance)) if distance < -1.0 && grid.is_flat(next) => view.drops += 1.0,
+                        Some((_, distance)) if distance > -1.0 => view.rises += 1.0,
+                        _ => view.open += 1.0,
                     }
                 }
             }

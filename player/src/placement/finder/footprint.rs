@@ -104,17 +104,21 @@ impl Survey<'_> {
             .into_iter()
             .map(|piece| (piece.cells().map(|cell| counts.get(cell).copied().unwrap_or(0)).sum(), piece))
             .collect();
-        pieces.sort_by_key(|entry| std::cmp::Reverse(entry.0));
+        pieces.sort_by(|a, b| b.0.cmp(&a.0));
         pieces
             .into_iter()
             .take(most)
-            .filter_map(|(count, piece)| {
+            .filter_map(|(_, piece)| {
                 let near = piece.dilated(1);
                 let mut own =
                     on.iter().copied().filter(|flat| coarse.cell(*flat).is_some_and(|cell| near.get(cell)));
                 let (low, high) = bounds(&mut own);
-                let area_m2 = piece.count() as f64 * coarse.cell_m * coarse.cell_m;
-                let spacing_m = (area_m2 / f64::from(count.max(1))).sqrt();
+                // Cells on the rim of a piece are half empty: the spacing is that of the fuller ones.
+                let mut filling: Vec<u32> =
+                    piece.cells().map(|cell| counts.get(cell).copied().unwrap_or(0)).collect();
+                filling.sort_unstable();
+                let full = filling.get(filling.len() * 3 / 4).copied().unwrap_or(1).max(1);
+                let spacing_m = coarse.cell_m / f64::from(full).sqrt();
                 let cell_m =
                     (2.5 * spacing_m).clamp(self.least_cell_m, 2.0 * self.gap_m.max(self.least_cell_m));
                 self.piece(Frame::new(plane, low, high, cell_m))

@@ -16,6 +16,9 @@ pub enum UpSource {
     Given,
     /// From the level and upright planes.
     Planes,
+    /// An axis of a cloud without order that the planes come close to: such clouds come from trackers and scanners whose
+    /// frames are made level.
+    Axis,
     /// Only from how the picture was held: no plane could be level.
     Picture,
 }
@@ -41,6 +44,10 @@ const LEAST_UPRIGHT: f64 = 0.2;
 
 /// A camera does not lean sideways further than this (sine).
 const MOST_ROLL: f64 = 0.5;
+
+/// An estimate this close to an axis of a cloud without order is that axis, radians: chance comes as near to one of the six
+/// in one cloud of 90.
+const NEAR_AXIS: f64 = 0.087;
 
 /// Estimates up from the picture's own vertical, the direction of view, and the planes in it.
 pub(super) fn estimate(picture_up: DVec3, view: DVec3, votes: &[Vote]) -> Up {
@@ -91,6 +98,12 @@ pub(super) fn conventional_vertical(view: DVec3) -> DVec3 {
     } else {
         DVec3::Y
     }
+}
+
+/// The axis that a direction is close to.
+pub(super) fn near_axis(direction: DVec3) -> Option<DVec3> {
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    axes.into_iter().flat_map(|axis| [axis, -axis]).find(|axis| axis.angle_between(direction) < NEAR_AXIS)
 }
 
 #[cfg(test)]

@@ -43,7 +43,8 @@ const SAME_PLANE: f64 = 0.9976;
 /// Finds surfaces in clouds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Finder {
-    /// Noise of the sensor; `None`: triangulated for organised clouds, even with 8 mm for others.
+    /// Noise of the sensor. `None`: triangulated for organised clouds, with a factor that the cloud itself shows; even
+    /// with 8 mm for others.
     pub noise: Option<Noise>,
 }
 
@@ -104,12 +105,21 @@ impl Finder {
     /// Finds the surfaces of a cloud.
     #[must_use]
     pub fn find(&self, cloud: &PointCloud) -> Finding {
+        let given = cloud.up().map(|direction| Up { direction, source: UpSource::Given });
+        let finding = self.find_with(cloud, given);
+        let is_estimated = finding.up.source == UpSource::Planes && cloud.layout().is_none();
+        match gravity::near_axis(finding.up.direction).filter(|_| is_estimated) {
+            Some(direction) => self.find_with(cloud, Some(Up { direction, source: UpSource::Axis })),
+            None => finding,
+        }
+    }
+
+    fn find_with(&self, cloud: &PointCloud, known_up: Option<Up>) -> Finding {
         let viewpoint = cloud.viewpoint_m();
         let measured =
             || cloud.points_m().iter().filter(|point| point.is_finite()).map(|point| point.as_dvec3());
-        let default_noise = if cloud.layout().is_some() { Noise::Triangulated } else { Noise::Even(0.008) };
-        let noise = self.noise.unwrap_or(default_noise);
-        let grid = BlockGrid::new(cloud, noise);
+        let grid = BlockGrid::new(cloud, self.noise);
+        let noise = self.noise.or(grid.as_ref().map(|grid| grid.noise)).unwrap_or(Noise::Even(0.008));
         let points = match cloud.layout() {
             Some((columns, rows)) => every_nth(cloud, columns, rows),
             None => neighbours::thinned(measured(), thinning_m(measured().count())),
@@ -121,28 +131,24 @@ impl Finder {
             noise,
             least_cell_m: if is_dense { 0.01 } else { 0.02 },
             gap_m: if is_dense { 0.05 } else { 0.08 },
-            level_up: if is_dense { None } else { cloud.up() },
+            level_up: known_up.map(|up| up.direction).filter(|_| !is_dense),
         };
         let planes = match &grid {
             Some(grid) => distinct(&survey, grid.planes(viewpoint)),
-            None => scattered::planes(&survey, cloud.up()),
+            None => scattered::planes(&survey, survey.level_up),
         };
         let pieces = pieces(&survey, &planes, grid.as_ref());
 
         let view: DVec3 = points.iter().map(|point| (*point - viewpoint).normalize_or_zero()).sum();
         let view = view.try_normalize().unwrap_or(DVec3::Z);
-        let up = match cloud.up() {
-            Some(direction) => Up { direction, source: UpSource::Given },
-            None => {
-                let vertical = grid.as_ref().and_then(|grid| grid.picture_up);
-                let votes: Vec<gravity::Vote> = pieces
-                    .iter()
-                    .map(|piece| (piece.fit.plane.normal, piece.footprint.measured as f64))
-                    .collect();
-                let vertical = vertical.unwrap_or_else(|| gravity::conventional_vertical(view));
-                gravity::estimate(vertical, view, &votes)
-            }
-        };
+        let up = known_up.unwrap_or_else(|| {
+            let vertical = grid.as_ref().and_then(|grid| grid.picture_up);
+            let votes: Vec<gravity::Vote> = pieces
+                .iter()
+                .map(|piece| (piece.fit.plane.normal, piece.footprint.measured as f64))
+                .collect();
+            gravity::estimate(vertical.unwrap_or_else(|| gravity::conventional_vertical(view)), view, &votes)
+        });
         let verdicts = classify::classify(&pieces, up, viewpoint);
         let surfaces = pieces.into_iter().zip(verdicts).zip(0..).map(|((piece, verdict), id)| {
             let confidence = classify::confidence(&piece, &verdict, up);

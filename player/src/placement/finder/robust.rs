@@ -127,7 +127,7 @@ mod tests {
         }
         let start = Plane { normal: DVec3::new(0.05, 1.0, 0.02).normalize(), offset_m: -0.004 };
         let viewpoint = DVec3::new(0.0, 0.6, 0.0);
-        let (fit, counted) = refine(&points, start, Noise::Triangulated, viewpoint, 0.03).unwrap();
+        let (fit, counted) = refine(&points, start, Noise::Triangulated(1.0), viewpoint, 0.03).unwrap();
         let degrees = fit.plane.normal.angle_between(DVec3::Y).to_degrees();
         assert!(
             degrees < 0.2 && fit.plane.distance_m(DVec3::new(0.0, 0.0, -1.0)).abs() < 0.001,

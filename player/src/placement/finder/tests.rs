@@ -139,6 +139,17 @@ fn a_phones_few_points_with_gravity() {
 }
 
 #[test]
+fn a_phones_few_points_without_gravity() {
+    let sensor = Sensor { outliers: 0.05, ..Sensor::default() };
+    let gathered = sensor.gather(&with_table(), EYE, TARGET, 6000, 0.008);
+    let cloud = PointCloud::unorganised(gathered.points_m().to_vec()).seen_from(EYE);
+    let finding = Finder::default().find(&cloud);
+    assert_eq!(finding.up, Up { direction: DVec3::Y, source: UpSource::Axis });
+    let found = finding.table().unwrap_or_else(|| panic!("{finding:#?}"));
+    assert!((found.surface.plane.offset_m + 0.74).abs() < 0.01, "{found:?}");
+}
+
+#[test]
 fn a_room_keeps_its_surfaces_when_the_sensor_moves() {
     use std::time::Duration;
 
