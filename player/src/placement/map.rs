@@ -78,6 +78,16 @@ impl SurfaceMap {
         self.known.get(&id).map(|known| &known.surface)
     }
 
+    /// The known surface that a surface of the room frame is a part of: the one with which it shares most.
+    #[must_use]
+    pub fn matching(&self, surface: &Surface) -> Option<SurfaceId> {
+        self.known
+            .iter()
+            .filter_map(|(id, known)| shared_cells(&known.surface, surface).map(|cells| (cells, *id)))
+            .max_by(|a, b| a.0.cmp(&b.0).then(b.1.cmp(&a.1)))
+            .map(|(_, id)| id)
+    }
+
     /// Takes in what one look at `now` showed, in the room frame; the ids of `seen` do not matter. `in_view` says whether a
     /// known surface should have been seen: only then does its absence count.
     pub fn update(
@@ -89,12 +99,8 @@ impl SurfaceMap {
         let mut changes = Vec::new();
         let mut updated: Vec<SurfaceId> = Vec::new();
         for surface in seen.iter().filter(|surface| surface.outline_m.len() >= 3) {
-            let best = self
-                .known
-                .iter()
-                .filter_map(|(id, known)| shared_cells(&known.surface, surface).map(|cells| (cells, *id)))
-                .max_by(|a, b| a.0.cmp(&b.0).then(b.1.cmp(&a.1)));
-            if let Some((_, id)) = best
+            let best = self.matching(surface);
+            if let Some(id) = best
                 && let Some(known) = self.known.get_mut(&id)
             {
                 known.take_in(surface, cells(&surface.plane, &surface.outline_m), now);

@@ -16,6 +16,7 @@ mod neighbours;
 mod noise;
 mod robust;
 mod scattered;
+mod several;
 
 use glam::DVec3;
 use serde::Serialize;

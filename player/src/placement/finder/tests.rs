@@ -175,6 +175,25 @@ fn a_room_keeps_its_surfaces_when_the_sensor_moves() {
 }
 
 #[test]
+fn several_looks_make_one_table() {
+    let looks: Vec<PointCloud> = [-0.9, 0.9]
+        .map(|x| {
+            // Each sees an end of the table only.
+            let camera = room_from_camera(DVec3::new(x, 1.25, 0.75), DVec3::new(x * 0.8, 0.7, 0.0));
+            Sensor::default().scan(&with_table(), &camera).moved(&glam::DMat4::from(camera))
+        })
+        .into();
+    let alone = Finder::default().find(&looks[0]).table().unwrap().area_m2;
+    let finding = Finder::default().find_in_all(&looks).unwrap();
+    let table = &finding.table().unwrap().surface;
+    assert!(table.plane.distance_m(DVec3::Y * 0.74).abs() < 0.003, "{table:?}");
+    let across =
+        |ends: fn(f64, f64) -> f64| table.outline_m.iter().map(|corner| corner.x).reduce(ends).unwrap();
+    assert!(across(f64::max) - across(f64::min) > 1.15, "{table:?}, {alone} m² alone");
+    assert!(Finder::default().find_in_all(&[]).is_none());
+}
+
+#[test]
 fn the_same_cloud_gives_the_same_answer() {
     let cloud = Sensor::default().gather(&with_table(), EYE, TARGET, 3000, 0.01);
     assert_eq!(Finder::default().find(&cloud), Finder::default().find(&cloud));
