@@ -32,6 +32,9 @@ Without --up, gravity is estimated from the planes and from how the sensor was h
 With --stream and --out it also draws the match on the table: hidden by what stands in front, with a shadow, in the
 light of the picture.";
 
+/// Most views of a sequence that the table is searched in, evenly spread.
+const MOST_LOOKS: usize = 12;
+
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct PlaceArguments {
@@ -55,7 +58,7 @@ pub(super) struct ScanArgument {
     /// A depth picture: 16 bits, distance along the optical axis.
     #[arg(long, value_name = "FILE.png|.pgm", requires = "intrinsics")]
     pub(super) depth: Option<PathBuf>,
-    /// A folder with posed views: depth/, color/ and pose.txt or trajectory.log. The table is looked for in the first.
+    /// A folder with posed views: depth/, color/ and pose.txt or trajectory.log. The table is looked for in up to 12.
     #[arg(long, value_name = "DIR", requires = "intrinsics")]
     pub(super) sequence: Option<PathBuf>,
 }
@@ -183,19 +186,20 @@ impl<'a> PlaneReport<'a> {
 
 pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
     let asked = arguments.picture.asked();
-    let (cloud, room) = match asked {
-        Some(_) => {
-            let room = place_picture::read(&arguments.scan, &arguments.options, &arguments.picture)?;
-            (room.found_in.cloud.clone(), Some(room))
-        }
-        None => (read(&arguments.scan, &arguments.options)?, None),
+    let room = asked
+        .map(|_| place_picture::read(&arguments.scan, &arguments.options, &arguments.picture))
+        .transpose()?;
+    let looks = match &room {
+        Some(room) if arguments.scan.sequence.is_none() => vec![room.found_in.cloud.clone()],
+        _ => read(&arguments.scan, &arguments.options)?,
     };
-    let points = cloud.points_m().iter().filter(|point| point.is_finite()).count();
+    let measured = |look: &PointCloud| look.points_m().iter().filter(|point| point.is_finite()).count();
+    let points = looks.iter().map(measured).sum();
     if points == 0 {
         bail!("{}: no point was measured: scan again", arguments.scan.path().display());
     }
     let (on_processor, on_wall) = (processor_ms(), Instant::now());
-    let finding = Finder::default().find(&cloud);
+    let finding = Finder::default().find_in_all(&looks).context("no look at the room")?;
     let find_wall_ms = on_wall.elapsed().as_secs_f64() * 1e3;
     let find_ms = match (on_processor, processor_ms()) {
         (Some(before), Some(after)) => after - before,
@@ -251,26 +255,27 @@ impl ScanArgument {
     }
 }
 
-fn read(scan: &ScanArgument, options: &ScanOptions) -> anyhow::Result<PointCloud> {
-    let mut cloud = match (&scan.cloud, &scan.depth, &options.intrinsics) {
-        (Some(path), _, _) => scan::read_cloud(path)?,
+/// The looks at the room that the table is searched in: one, or some of a sequence.
+fn read(scan: &ScanArgument, options: &ScanOptions) -> anyhow::Result<Vec<PointCloud>> {
+    let metres_per_unit = 1.0 / options.depth_scale;
+    let looks = match (&scan.cloud, &scan.depth, &options.intrinsics) {
+        (Some(path), _, _) => vec![scan::read_cloud(path)?],
         (None, Some(path), Some(intrinsics)) => {
-            let picture = scan::read_depth(path, 1.0 / options.depth_scale)?;
-            PointCloud::from_depth(&picture, &intrinsics.read()?)
+            vec![PointCloud::from_depth(&scan::read_depth(path, metres_per_unit)?, &intrinsics.read()?)]
         }
         (None, None, Some(intrinsics)) => {
             let folder = scan.sequence.as_deref().unwrap_or(Path::new(""));
-            let views = scan::read_sequence(folder)?;
-            let first = views.first().with_context(|| format!("{}: an empty sequence", folder.display()))?;
-            let picture = scan::read_depth(&first.depth, 1.0 / options.depth_scale)?;
-            PointCloud::from_depth(&picture, &intrinsics.read()?).moved(&first.room_from_camera)
+            let (views, intrinsics) = (scan::read_sequence(folder)?, intrinsics.read()?);
+            let looks = views.iter().step_by(views.len().div_ceil(MOST_LOOKS).max(1)).map(|view| {
+                let picture = scan::read_depth(&view.depth, metres_per_unit)?;
+                Ok(PointCloud::from_depth(&picture, &intrinsics).moved(&view.room_from_camera))
+            });
+            looks.collect::<anyhow::Result<_>>()?
         }
         _ => bail!("give --cloud, or --depth or --sequence with --intrinsics"),
     };
-    if let Some(up) = options.up {
-        cloud = cloud.with_up(up);
-    }
-    Ok(cloud)
+    let Some(up) = options.up else { return Ok(looks) };
+    Ok(looks.into_iter().map(|look| look.with_up(up)).collect())
 }
 
 impl IntrinsicsArgument {
