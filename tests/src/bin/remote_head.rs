@@ -14,6 +14,8 @@ use std::{
 const FOV: [f32; 4] = [-0.8, 0.8, 0.7, -0.7];
 /// Half the distance of the eyes, metres.
 const HALF_EYES_M: f32 = 0.032;
+/// Height of the head above the floor at which Monado has the origin of its `LOCAL` space, metres.
+const STANDING_M: f32 = 1.6;
 /// Looking down by 30 degrees: half the angle's sine and cosine.
 const DOWN: [f32; 4] = [-0.258_819, 0.0, 0.0, 0.965_926];
 const UPRIGHT: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
@@ -32,12 +34,12 @@ fn packet() -> Vec<u8> {
         packet.extend([0; 4]);
     }
     floats(&mut packet, &DOWN);
-    floats(&mut packet, &[0.0; 3]);
+    floats(&mut packet, &[0.0, STANDING_M, 0.0]);
     // The poses of the eyes are valid.
     packet.extend([1, 0, 0, 0]);
     for x in [-0.2, 0.2] {
         floats(&mut packet, &UPRIGHT);
-        floats(&mut packet, &[x, -0.3, -0.4]);
+        floats(&mut packet, &[x, STANDING_M - 0.3, -0.4]);
         // Velocities, sticks, fingers.
         floats(&mut packet, &[0.0; 19]);
         // Active, and none of the buttons.
