@@ -38,6 +38,9 @@ const MOST_POINTS: usize = 40_000;
 /// Pieces of one plane that are kept.
 const PIECES_OF_A_PLANE: usize = 3;
 
+/// How far above the highest point an eye is put where the scan does not tell, metres.
+const OVERHEAD_M: f64 = 1.0;
+
 /// Two fits of nearly the same plane are one: cosine of 4 degrees.
 const SAME_PLANE: f64 = 0.9976;
 
@@ -116,7 +119,6 @@ impl Finder {
     }
 
     fn find_with(&self, cloud: &PointCloud, known_up: Option<Up>) -> Finding {
-        let viewpoint = cloud.viewpoint_m();
         let measured =
             || cloud.points_m().iter().filter(|point| point.is_finite()).map(|point| point.as_dvec3());
         let grid = BlockGrid::new(cloud, self.noise);
@@ -126,6 +128,10 @@ impl Finder {
             None => neighbours::thinned(measured(), thinning_m(measured().count())),
         };
         let is_dense = grid.is_some();
+        let viewpoint = match known_up.filter(|_| !is_dense) {
+            Some(up) => eye_above(&points, cloud.viewpoint_m(), up.direction),
+            None => cloud.viewpoint_m(),
+        };
         let survey = Survey {
             points: &points,
             viewpoint,
@@ -183,6 +189,23 @@ fn every_nth(cloud: &PointCloud, columns: usize, rows: usize) -> Vec<DVec3> {
         .filter(|point| point.is_finite())
         .map(|point| point.as_dvec3())
         .collect()
+}
+
+/// Where points without order are taken to be seen from: the given place if it is above most of them, or else one high
+/// above their middle. The origin of a scan of a room is often on its floor, where nobody looked from.
+fn eye_above(points: &[DVec3], given: DVec3, up: DVec3) -> DVec3 {
+    let mut heights: Vec<f64> = points.iter().map(|point| up.dot(*point)).collect();
+    if heights.is_empty() {
+        return given;
+    }
+    let place = heights.len() * 4 / 5;
+    let (_, high, _) = heights.select_nth_unstable_by(place, f64::total_cmp);
+    if up.dot(given) > *high {
+        return given;
+    }
+    let highest = heights.iter().copied().fold(f64::MIN, f64::max);
+    let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+    middle.reject_from_normalized(up) + up * (highest + OVERHEAD_M)
 }
 
 /// Side of the cubes that a cloud without order is thinned to: small clouds keep every point, scans of a room one each 2 cm.

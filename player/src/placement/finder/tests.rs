@@ -150,6 +150,17 @@ fn a_phones_few_points_without_gravity() {
 }
 
 #[test]
+fn a_scan_whose_origin_is_on_the_floor() {
+    let gathered = Sensor::default().gather(&with_table(), EYE, TARGET, 8000, 0.005);
+    let cloud = PointCloud::unorganised(gathered.points_m().to_vec()).with_up(DVec3::Y);
+    let finding = Finder::default().find(&cloud);
+    let found = finding.table().unwrap_or_else(|| panic!("{finding:#?}"));
+    assert!(found.surface.plane.normal.dot(DVec3::Y) > 0.99, "seen from above: {found:?}");
+    assert!((found.surface.plane.offset_m + 0.74).abs() < 0.01, "{found:?}");
+    assert_eq!(found.surface.kind, SurfaceKind::Table);
+}
+
+#[test]
 fn a_room_keeps_its_surfaces_when_the_sensor_moves() {
     use std::time::Duration;
 
