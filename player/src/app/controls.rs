@@ -39,8 +39,8 @@ fn slider(ui: &mut Ui, frame: &mut u32, last: u32) -> Response {
     response
 }
 
-/// Play, step, speed, camera and where we are.
-pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: Duration) {
+/// Play, step, speed, camera (in a recorded room there is only one) and where we are.
+pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: Option<&mut Look>, now: Duration) {
     ui.horizontal(|ui| {
         let ready = session.timeline().is_some();
         let playing = session.is_playing();
@@ -62,7 +62,9 @@ pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: &mut Look, now: 
         }
         ui.add_space(8.0);
         speed_menu(ui, session, now);
-        camera_menu(ui, look);
+        if let Some(look) = look {
+            camera_menu(ui, look);
+        }
         ui.add_space(8.0);
         ui.label(position(session));
     });

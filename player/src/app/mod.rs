@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 use egui::{CentralPanel, Color32, Panel, RichText, Ui};
 use protocol::pitch::Pitch;
 
-use crate::placement::gesture::Placement;
 use crate::{
     camera::{OrbitCamera, Preset},
+    placement::gesture::Placement,
     session::Session,
     source::Location,
 };
@@ -135,7 +135,8 @@ impl eframe::App for PlayerApp {
         Panel::bottom("controls").show(ui, |ui| {
             ui.add_space(6.0);
             controls::timeline(ui, &mut self.session, now);
-            controls::buttons(ui, &mut self.session, &mut self.look, now);
+            let look = self.room.is_none().then_some(&mut self.look);
+            controls::buttons(ui, &mut self.session, look, now);
             if let Some(room) = &mut self.room {
                 ui.horizontal(|ui| {
                     let standing = room.placement().standing().is_some();

@@ -165,6 +165,35 @@ fn what_does_not_fit_says_why() {
     }
 }
 
+/// A preview is fitted anew whenever a surface is refined: it must not cost a headset its frames.
+#[test]
+fn a_fit_takes_a_few_milliseconds() {
+    let corner = |index: i32| {
+        let (sin, cos) = (f64::from(index) * std::f64::consts::TAU / 40.0).sin_cos();
+        let radius = 1.0 + 0.05 * f64::from(index % 3);
+        (0.9 * radius * cos, 0.5 * radius * sin)
+    };
+    let outline: Vec<_> = (0..40).map(corner).collect();
+    let thing = |x: f64, z: f64| {
+        let around = |index: i32| {
+            let (sin, cos) = (f64::from(index) * std::f64::consts::TAU / 16.0).sin_cos();
+            (x + 0.06 * cos, z + 0.06 * sin)
+        };
+        (0..16).map(around).collect::<Vec<_>>()
+    };
+    let things = [thing(0.5, 0.2), thing(-0.5, -0.2), thing(0.1, 0.4), thing(-0.7, 0.1), thing(0.3, -0.3)];
+    let holes: Vec<&[(f64, f64)]> = things.iter().map(Vec::as_slice).collect();
+    let table = surface(&outline, &holes, DQuat::IDENTITY);
+    let wish = Wish { viewer_m: Some(DVec3::new(0.0, 1.6, 1.5)), ..Wish::of(Pitch::default()) };
+    let started = std::time::Instant::now();
+    for _ in 0..20 {
+        assert!(fit(&table, &wish).is_ok());
+    }
+    let each_ms = started.elapsed().as_secs_f64() * 1e3 / 20.0;
+    println!("40 corners and five things of 16: {each_ms:.1} ms a fit");
+    assert!(each_ms < 200.0, "{each_ms} ms");
+}
+
 #[test]
 fn huge_floors_stop_at_the_limit() {
     let floor = Surface { kind: SurfaceKind::Floor, ..table(40.0, 30.0) };
