@@ -191,7 +191,7 @@ impl BlockGrid {
                 regions.push((count, fit));
             }
         }
-        regions.sort_by(|a, b| b.0.cmp(&a.0));
+        regions.sort_by_key(|entry| std::cmp::Reverse(entry.0));
         regions.truncate(MOST_REGIONS);
         regions.into_iter().map(|(_, fit)| fit).collect()
     }

@@ -104,7 +104,7 @@ impl Survey<'_> {
             .into_iter()
             .map(|piece| (piece.cells().map(|cell| counts.get(cell).copied().unwrap_or(0)).sum(), piece))
             .collect();
-        pieces.sort_by(|a, b| b.0.cmp(&a.0));
+        pieces.sort_by_key(|entry| std::cmp::Reverse(entry.0));
         pieces
             .into_iter()
             .take(most)

@@ -35,7 +35,7 @@ pub(super) fn planes(survey: &Survey<'_>, up: Option<DVec3>) -> Vec<Fit> {
             .into_iter()
             .map(|plane| (supporters(&sample, &plane, survey), plane))
             .collect();
-        scored.sort_by(|a, b| b.0.cmp(&a.0));
+        scored.sort_by_key(|entry| std::cmp::Reverse(entry.0));
         let best = scored.into_iter().take(4).filter_map(|(_, plane)| {
             let widest_m = 2.0 * survey.reach_m(&plane, survey.viewpoint - plane.normal);
             robust::refine(&left, plane, survey.noise, survey.viewpoint, widest_m)
