@@ -1,7 +1,8 @@
 //! Holds the head of Monado's `remote` driver still, so that the pictures of a headset can be compared.
 //!
 //! The driver listens on port 4242 and takes packets of 376 bytes (Monado's `r_interface.h`, protocol `mndrmt3`): both eyes'
-//! fields of view and poses, the head's pose, two controllers. This sends one and holds the connection until it is killed.
+//! fields of view and poses, the head's pose, two controllers. This sends one and holds the connection until it is killed;
+//! with the argument `select` the right controller points at the table of the tests and pulls its trigger every second.
 
 use std::{
     io::{self, Read, Write},
@@ -25,7 +26,10 @@ fn floats(packet: &mut Vec<u8>, values: &[f32]) {
     packet.extend(values.iter().flat_map(|value| value.to_le_bytes()));
 }
 
-fn packet() -> Vec<u8> {
+/// Down by 35 degrees: from the hand over the panel to the table.
+const AT_THE_TABLE: [f32; 4] = [-0.300_706, 0.0, 0.0, 0.953_717];
+
+fn packet(selects: bool, pressed: bool) -> Vec<u8> {
     let mut packet = b"mndrmt3\0".to_vec();
     for x in [-HALF_EYES_M, HALF_EYES_M] {
         floats(&mut packet, &FOV);
@@ -37,21 +41,24 @@ fn packet() -> Vec<u8> {
     floats(&mut packet, &[0.0, STANDING_M, 0.0]);
     // The poses of the eyes are valid.
     packet.extend([1, 0, 0, 0]);
-    for x in [-0.2, 0.2] {
-        floats(&mut packet, &UPRIGHT);
-        floats(&mut packet, &[x, STANDING_M - 0.3, -0.4]);
+    for (x, points) in [(-0.2, false), (0.2, selects)] {
+        floats(&mut packet, if points { &AT_THE_TABLE } else { &UPRIGHT });
+        floats(&mut packet, &[x, STANDING_M, -0.3]);
         // Velocities, sticks, fingers.
         floats(&mut packet, &[0.0; 19]);
-        // Active, and none of the buttons.
-        packet.extend([1, 1]);
-        packet.extend([0; 14]);
+        // Active, and of the buttons at most the trigger.
+        let mut buttons = [0; 16];
+        (buttons[0], buttons[1]) = (1, 1);
+        buttons[8] = u8::from(points && pressed);
+        packet.extend(buttons);
     }
     packet
 }
 
 fn main() -> io::Result<()> {
-    let packet = packet();
-    assert_eq!(packet.len(), PACKET_BYTES);
+    let selects = std::env::args().nth(1).is_some_and(|argument| argument == "select");
+    let first = packet(selects, false);
+    assert_eq!(first.len(), PACKET_BYTES);
     let mut connection = loop {
         match TcpStream::connect(("127.0.0.1", 4242)) {
             Ok(connection) => break connection,
@@ -61,8 +68,14 @@ fn main() -> io::Result<()> {
     // The driver first tells its own state.
     let mut greeting = [0; PACKET_BYTES];
     connection.read_exact(&mut greeting)?;
-    connection.write_all(&packet)?;
+    connection.write_all(&first)?;
     println!("head set");
+    while selects {
+        for pressed in [true, false] {
+            thread::sleep(Duration::from_millis(500));
+            connection.write_all(&packet(selects, pressed))?;
+        }
+    }
     let mut rest = [0; 1024];
     while connection.read(&mut rest)? > 0 {}
     Ok(())

@@ -54,6 +54,17 @@ fn both_eyes_see_the_match_on_the_runtimes_table() {
     Snapshot::new("headset-right", right).matches_within(0.005, 0.1);
 }
 
+/// No `--place`: the trigger of a controller that points at the table puts the match there.
+#[test]
+fn a_controllers_trigger_puts_the_match_on_the_table() {
+    let _alone = ALONE.lock();
+    let Some(runtime) = start(Head::Selecting, 60) else { return };
+    let script = ["--exit-after-frames", "60", "--json", "/mnt/out/figures.json"];
+    succeeded(&runtime.player("/mnt/stream", &script).output().unwrap());
+    let figures = figures(&runtime.out().join("figures.json"));
+    assert_eq!((&figures["planes"], &figures["on_a_plane"]), (&2.into(), &true.into()), "{figures}");
+}
+
 #[test]
 fn a_played_match_costs_little_and_makes_no_mistake() {
     let _alone = ALONE.lock();

@@ -20,6 +20,8 @@ pub enum Head {
     Wobbling,
     /// Held still, looking down at the table.
     Still,
+    /// The same, and the right controller pulls its trigger at the table.
+    Selecting,
 }
 
 /// The folder with the runtime; `None`, with the reason printed, when there is none.
@@ -69,10 +71,11 @@ impl Runtime {
         command.args(["--unshare-net", "--unshare-pid", "--setenv", "XRT_COMPOSITOR_NULL", "1"]);
         // Monado ends when its standard input does: a FIFO that nobody closes keeps it.
         let mut script = "mkfifo /tmp/in && { sleep 100000 > /tmp/in & }".to_owned();
-        if self.head == Head::Still {
+        if self.head != Head::Wobbling {
             command.args(["--setenv", "P_OVERRIDE_ACTIVE_CONFIG", "remote", "--ro-bind"]);
             command.arg(env!("CARGO_BIN_EXE_remote_head")).arg("/opt/remote_head");
-            script += " && { /opt/remote_head > /mnt/run/head & }";
+            let argument = if self.head == Head::Selecting { "select" } else { "" };
+            script += &format!(" && {{ /opt/remote_head {argument} > /mnt/run/head & }}");
         }
         script += " && exec monado-service < /tmp/in";
         let log = fs::File::create(self.shared.path().join("monado.log")).expect("a log");
