@@ -70,8 +70,8 @@ fn main() -> io::Result<()> {
     connection.read_exact(&mut greeting)?;
     connection.write_all(&first)?;
     println!("head set");
-    while selects {
-        for pressed in [true, false] {
+    if selects {
+        for pressed in [true, false].into_iter().cycle() {
             thread::sleep(Duration::from_millis(500));
             connection.write_all(&packet(selects, pressed))?;
         }
