@@ -1,7 +1,7 @@
 //! How the table finder holds out against noise, wild points, a leaning table and few points, in rooms whose truth is
 //! known. Writes `placement-sweep.csv` and `placement-sweep.svg` into a folder.
 //!
-//! `cargo run -p player --features sample --example placement_sweep -- docs`
+//! `cargo run -p player --example placement_sweep -- docs`
 
 use std::{error::Error, fmt::Write, path::PathBuf};
 

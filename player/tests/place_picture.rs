@@ -15,7 +15,10 @@ use std::{
 
 use glam::DVec3;
 use player::{
-    ar::{RoomPicture, synthetic::SyntheticRoom},
+    ar::{
+        RoomPicture,
+        synthetic::{SyntheticRoom, to_pcd},
+    },
     offscreen::Offscreen,
 };
 
@@ -34,25 +37,6 @@ fn player(arguments: &[&str]) -> Output {
 /// A point in the axes of the picture's camera.
 fn in_camera(picture: &RoomPicture, point: DVec3) -> DVec3 {
     picture.camera.rotation * (point - picture.camera.position_m)
-}
-
-/// An organised cloud with colours.
-fn write_pcd(picture: &RoomPicture, path: &Path) {
-    let (width, height) = picture.colour.dimensions();
-    let mut bytes = format!(
-        "VERSION 0.7\nFIELDS x y z rgba\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH {width}\nHEIGHT {height}\n\
-         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA binary\n",
-        width * height
-    )
-    .into_bytes();
-    for (column, row, colour) in picture.colour.enumerate_pixels() {
-        let point = picture.point_m(column, row).map(|point| in_camera(picture, point).as_vec3());
-        let point = point.unwrap_or(glam::Vec3::NAN);
-        bytes.extend(point.to_array().iter().flat_map(|value| value.to_le_bytes()));
-        let [red, green, blue, _] = colour.0;
-        bytes.extend([blue, green, red, 255]);
-    }
-    fs::write(path, bytes).unwrap();
 }
 
 /// The room's three cameras as a sequence of depth and colour pictures with poses.
@@ -95,6 +79,20 @@ impl Files {
     fn text(&self, name: &str) -> String {
         self.path(name).to_str().unwrap().to_owned()
     }
+
+    /// `player place` with a scan and the stream of these files.
+    fn place(&self, scan: &[&str]) -> Output {
+        let (stream, out, json) = (self.text("stream"), self.text("out.png"), self.text("out.json"));
+        player(&[&["place", "--stream", &stream, "--out", &out, "--json", &json], scan].concat())
+    }
+
+    /// The picture and the JSON of a placing that succeeds.
+    fn drawn(&self, scan: &[&str]) -> (image::RgbaImage, serde_json::Value) {
+        let output = self.place(scan);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let picture = image::open(self.path("out.png")).unwrap().into_rgba8();
+        (picture, serde_json::from_str(&fs::read_to_string(self.path("out.json")).unwrap()).unwrap())
+    }
 }
 
 fn greens(picture: &image::RgbaImage) -> usize {
@@ -110,28 +108,11 @@ fn the_match_is_drawn_on_the_table_of_a_cloud() {
     let files = Files::new();
     let room = SyntheticRoom::default();
     let seen = room.picture(&room.cameras()[0]);
-    write_pcd(&seen, &files.path("room.pcd"));
+    fs::write(files.path("room.pcd"), to_pcd(&seen)).unwrap();
     for view in ["own", "left", "above"] {
-        let output = player(&[
-            "place",
-            "--cloud",
-            &files.text("room.pcd"),
-            "--stream",
-            &files.text("stream"),
-            "--frame",
-            "1",
-            "--view",
-            view,
-            "--out",
-            &files.text("out.png"),
-            "--json",
-            &files.text("out.json"),
-        ]);
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        let drawn = image::open(files.path("out.png")).unwrap().into_rgba8();
+        let (drawn, json) =
+            files.drawn(&["--cloud", &files.text("room.pcd"), "--frame", "1", "--view", view]);
         assert!(greens(&drawn) > 15_000, "{view}: {} green pixels", greens(&drawn));
-        let json: serde_json::Value =
-            serde_json::from_str(&fs::read_to_string(files.path("out.json")).unwrap()).unwrap();
         let position: [f64; 3] = serde_json::from_value(json["pitch"]["position"].clone()).unwrap();
         let table = DVec3::from_array(serde_json::from_value(json["table"]["normal"].clone()).unwrap());
         let offset = json["table"]["offset_m"].as_f64().unwrap();
@@ -139,17 +120,7 @@ fn the_match_is_drawn_on_the_table_of_a_cloud() {
         let truth = in_camera(&seen, DVec3::ZERO).y - in_camera(&seen, DVec3::Y).y;
         assert!((-table.y - truth).abs() < 0.01, "the table's normal is the room's up");
     }
-    let wrong = player(&[
-        "place",
-        "--cloud",
-        &files.text("room.pcd"),
-        "--stream",
-        &files.text("stream"),
-        "--view",
-        "behind",
-        "--out",
-        &files.text("out.png"),
-    ]);
+    let wrong = files.place(&["--cloud", &files.text("room.pcd"), "--view", "behind"]);
     assert_eq!(wrong.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&wrong.stderr).contains("there is no view `behind`"));
 }
@@ -163,26 +134,9 @@ fn a_sequence_shows_the_same_place_from_every_view() {
     write_sequence(&SyntheticRoom::default(), &files.path("room"));
     let mut places = Vec::new();
     for view in ["own", "1", "2"] {
-        let output = player(&[
-            "place",
-            "--sequence",
-            &files.text("room"),
-            "--intrinsics",
-            "525,525,319.5,239.5",
-            "--stream",
-            &files.text("stream"),
-            "--view",
-            view,
-            "--out",
-            &files.text("out.png"),
-            "--json",
-            &files.text("out.json"),
-        ]);
-        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        let drawn = image::open(files.path("out.png")).unwrap().into_rgba8();
+        let scan = ["--sequence", &files.text("room"), "--intrinsics", "525,525,319.5,239.5"];
+        let (drawn, json) = files.drawn(&[&scan[..], &["--view", view]].concat());
         assert!(greens(&drawn) > 15_000, "{view}: {} green pixels", greens(&drawn));
-        let json: serde_json::Value =
-            serde_json::from_str(&fs::read_to_string(files.path("out.json")).unwrap()).unwrap();
         let position: [f64; 3] = serde_json::from_value(json["pitch"]["position"].clone()).unwrap();
         assert!((position[1] - 0.74).abs() < 0.01, "{view}: not on the table: {position:?}");
         places.push(position);
@@ -197,16 +151,8 @@ fn without_a_table_there_is_no_picture() {
     let room = SyntheticRoom::default();
     let camera =
         room.cameras()[0].looking_at(DVec3::new(0.0, 1.6, 0.2), DVec3::new(0.0, 1.9, -1.6), DVec3::Y);
-    write_pcd(&room.picture(&camera), &files.path("wall.pcd"));
-    let output = player(&[
-        "place",
-        "--cloud",
-        &files.text("wall.pcd"),
-        "--stream",
-        &files.text("stream"),
-        "--out",
-        &files.text("out.png"),
-    ]);
+    fs::write(files.path("wall.pcd"), to_pcd(&room.picture(&camera))).unwrap();
+    let output = files.place(&["--cloud", &files.text("wall.pcd")]);
     assert_eq!(output.status.code(), Some(1), "{}", String::from_utf8_lossy(&output.stdout));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("no table found") && !files.path("out.png").exists(), "{said}");

@@ -6,6 +6,7 @@ mod camera;
 mod holes;
 mod light;
 mod picture;
+#[cfg(any(test, feature = "sample"))]
 pub mod synthetic;
 mod warp;
 

@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use image::{Rgba, RgbaImage};
 
-use super::{RoomCamera, RoomPicture};
+use super::{RoomCamera, RoomPicture, holes};
 use crate::placement::{Plane, Surface, SurfaceId, SurfaceKind};
 
 /// Between the sensor's projector and its camera, metres: what the projector does not reach has no depth.
@@ -124,13 +124,8 @@ impl SyntheticRoom {
             depth_m.push(if seen { self.measured(hit.along) } else { 0.0 });
             srgb(self.shaded(point, &hit))
         });
-        // Sizes agree by construction; were it not so, the picture would have no depth.
-        let unknown = vec![0.0; depth_m.len()];
-        RoomPicture::new(colour.clone(), depth_m, *camera).unwrap_or(RoomPicture {
-            colour,
-            depth_m: unknown,
-            camera: *camera,
-        })
+        holes::fill(&mut depth_m, width as usize);
+        RoomPicture { colour, depth_m, camera: *camera }
     }
 
     /// Steps of a Kinect's disparity: 2.85 mm at one metre, growing with the square of the distance.
@@ -230,6 +225,27 @@ impl Body {
             }
         }
     }
+}
+
+/// A picture as scanners write it: an organised cloud with colours, PCD, in the axes of its camera.
+#[must_use]
+pub fn to_pcd(picture: &RoomPicture) -> Vec<u8> {
+    let (width, height) = picture.colour.dimensions();
+    let mut bytes = format!(
+        "VERSION 0.7\nFIELDS x y z rgba\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH {width}\nHEIGHT {height}\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA binary\n",
+        width * height
+    )
+    .into_bytes();
+    let camera = &picture.camera;
+    for (column, row, colour) in picture.colour.enumerate_pixels() {
+        let point = picture.point_m(column, row).map(|point| camera.rotation * (point - camera.position_m));
+        let point = point.map_or(Vec3::NAN, DVec3::as_vec3);
+        bytes.extend(point.to_array().iter().flat_map(|value| value.to_le_bytes()));
+        let [red, green, blue, _] = colour.0;
+        bytes.extend([blue, green, red, 255]);
+    }
+    bytes
 }
 
 /// A little variation, so that no surface is one flat colour.

@@ -11,6 +11,7 @@ use glam::DVec3;
 use player::{
     placement::{Finder, Finding, FoundSurface, Intrinsics, PointCloud, Refusal, SurfaceId, SurfaceKind, Up},
     scan,
+    xr::thread_cpu_time,
 };
 use serde::{Deserialize, Serialize};
 
@@ -198,16 +199,10 @@ pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
     if points == 0 {
         bail!("{}: no point was measured: scan again", arguments.scan.path().display());
     }
-    let (on_processor, on_wall) = (processor_ms(), Instant::now());
+    let (on_processor, on_wall) = (thread_cpu_time(), Instant::now());
     let finding = Finder::default().find_in_all(&looks).context("no look at the room")?;
     let find_wall_ms = on_wall.elapsed().as_secs_f64() * 1e3;
-    let find_ms = match (on_processor, processor_ms()) {
-        (Some(before), Some(after)) => after - before,
-        _ => {
-            tracing::warn!("this system does not tell a thread's processor time: find_ms is by the clock");
-            find_wall_ms
-        }
-    };
+    let find_ms = (thread_cpu_time() - on_processor).as_secs_f64() * 1e3;
     let drawn = match (&room, asked) {
         (Some(room), Some(asked)) => {
             finding.table().map(|table| place_picture::draw(room, &table.surface, &asked))
@@ -239,13 +234,6 @@ pub(super) fn run(arguments: &PlaceArguments) -> anyhow::Result<()> {
 fn rejections(finding: &Finding) -> Vec<Rejection> {
     let refused = |found: &FoundSurface| Some(Rejection { id: found.surface.id, refusal: found.refusal? });
     finding.surfaces.iter().filter_map(refused).collect()
-}
-
-/// Milliseconds that this thread has spent on a processor.
-fn processor_ms() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
-    Some(nanoseconds / 1e6)
 }
 
 impl ScanArgument {

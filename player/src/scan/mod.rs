@@ -32,6 +32,11 @@ const MOST_BYTES: u64 = 2 << 30;
 /// # Errors
 /// [`ScanError`] when the file cannot be read or is damaged.
 pub fn read_cloud(path: &Path) -> Result<PointCloud, ScanError> {
+    cloud_of(path, &read_bytes(path)?)
+}
+
+/// The cloud in the bytes of a file.
+fn cloud_of(path: &Path, bytes: &[u8]) -> Result<PointCloud, ScanError> {
     let read = match extension(path).as_str() {
         "pcd" => pcd::read,
         "ply" => ply::read,
@@ -43,8 +48,7 @@ pub fn read_cloud(path: &Path) -> Result<PointCloud, ScanError> {
             });
         }
     };
-    let bytes = read_bytes(path)?;
-    read(&bytes).map_err(|problem| problem.within(&path.display().to_string()))
+    read(bytes).map_err(|problem| problem.within(&path.display().to_string()))
 }
 
 /// All bytes of a file that is not too large.

@@ -2,6 +2,8 @@
 //!
 //! `x`, `y`, `z` are kept, found by name, and the colours of clouds that have them. The format: <https://pointclouds.org/documentation/tutorials/pcd_file_format.html>.
 
+use std::borrow::Cow;
+
 use glam::{DVec3, Vec3};
 
 use super::{
@@ -33,39 +35,29 @@ struct Header {
     data: String,
 }
 
+impl Header {
+    /// Points in the file.
+    fn count(&self) -> usize {
+        self.width.saturating_mul(self.height)
+    }
+
+    /// Bytes of a point.
+    fn record(&self) -> usize {
+        self.fields.iter().map(Field::size).sum()
+    }
+}
+
 pub(super) fn read(bytes: &[u8]) -> Result<PointCloud, Problem> {
     let mut reader = Reader::new(bytes);
     let header = header(&mut reader)?;
-    let count = header.width.saturating_mul(header.height);
+    let count = header.count();
     let axes = axes(&header.fields)?;
-    let points = match header.data.as_str() {
-        "ascii" => ascii(&mut reader, &header, count, axes)?,
-        "binary" => {
-            let record = header.fields.iter().map(Field::size).sum::<usize>();
-            let body = reader.take(record.saturating_mul(count))?;
-            let offsets = axes.map(|axis| (offset(&header.fields, axis, 1), record));
-            gather(body, &header.fields, axes, offsets, count)?
+    let points = match body(&mut reader, &header)? {
+        Some(body) => {
+            let places = axes.map(|axis| body.place(&header, axis));
+            gather(&body.bytes, &header.fields, axes, places, count)?
         }
-        "binary_compressed" => {
-            let packed = reader.scalar(Scalar::U32, Endian::Little)? as usize;
-            let size = reader.scalar(Scalar::U32, Endian::Little)? as usize;
-            let record = header.fields.iter().map(Field::size).sum::<usize>();
-            if size != record.saturating_mul(count) {
-                let problem = format!("{size} bytes announced, {count} points of {record} bytes expected");
-                return Err(Problem::at(format!("byte {}", reader.position() - 4), problem));
-            }
-            let body = lzf::expand(reader.take(packed)?, size)?;
-            // Compressed files hold one field after the other.
-            let offsets = axes.map(|axis| {
-                let size = header.fields.get(axis).map_or(0, Field::size);
-                (offset(&header.fields, axis, count), size)
-            });
-            gather(&body, &header.fields, axes, offsets, count)?
-        }
-        other => {
-            let problem = format!("DATA {other}: ascii, binary or binary_compressed expected");
-            return Err(Problem::at(reader.here(), problem));
-        }
+        None => ascii(&mut reader, &header, count, axes)?,
     };
     let cloud = if header.height > 1 {
         PointCloud::organised(points, header.width)
@@ -79,33 +71,60 @@ pub(super) fn read(bytes: &[u8]) -> Result<PointCloud, Problem> {
 pub(super) fn colours(bytes: &[u8]) -> Result<Option<Vec<[u8; 4]>>, Problem> {
     let mut reader = Reader::new(bytes);
     let header = header(&mut reader)?;
-    let count = header.width.saturating_mul(header.height);
+    let count = header.count();
     let is_colour = |field: &Field| matches!(field.name.as_str(), "rgba" | "rgb") && field.size() == 4;
     let Some(at) = header.fields.iter().position(is_colour) else { return Ok(None) };
-    let record = header.fields.iter().map(Field::size).sum::<usize>();
-    let (body, start, step) = match header.data.as_str() {
-        "binary" => {
-            let body = reader.take(record.saturating_mul(count))?;
-            (std::borrow::Cow::Borrowed(body), offset(&header.fields, at, 1), record)
-        }
-        "binary_compressed" => {
-            let packed = reader.scalar(Scalar::U32, Endian::Little)? as usize;
-            let size = reader.scalar(Scalar::U32, Endian::Little)? as usize;
-            if size != record.saturating_mul(count) {
-                let problem = format!("{size} bytes announced, {count} points of {record} bytes expected");
-                return Err(Problem::at(format!("byte {}", reader.position() - 4), problem));
-            }
-            let body = lzf::expand(reader.take(packed)?, size)?;
-            (body.into(), offset(&header.fields, at, count), 4)
-        }
-        _ => return Ok(None),
-    };
-    let colour = |index: usize| match body.get(start + index * step..) {
+    let Some(body) = body(&mut reader, &header)? else { return Ok(None) };
+    let (start, step) = body.place(&header, at);
+    let colour = |index: usize| match body.bytes.get(start + index * step..) {
         // The bytes of 0x00RRGGBB, the lowest first.
         Some([blue, green, red, ..]) => Ok([*red, *green, *blue, 255]),
         _ => Err(Problem::at(format!("point {index}"), "missing")),
     };
     (0..count).map(colour).collect::<Result<_, _>>().map(Some)
+}
+
+/// The points as bytes: one record after the other, or one field after the other in compressed files.
+struct Body<'a> {
+    bytes: Cow<'a, [u8]>,
+    by_field: bool,
+}
+
+impl Body<'_> {
+    /// Where a field of the first point starts, and bytes from one point to the next.
+    fn place(&self, header: &Header, field: usize) -> (usize, usize) {
+        if self.by_field {
+            (offset(&header.fields, field, header.count()), header.fields.get(field).map_or(0, Field::size))
+        } else {
+            (offset(&header.fields, field, 1), header.record())
+        }
+    }
+}
+
+/// What follows the header of a binary file; `None` for ascii.
+fn body<'a>(reader: &mut Reader<'a>, header: &Header) -> Result<Option<Body<'a>>, Problem> {
+    let expected = header.record().saturating_mul(header.count());
+    match header.data.as_str() {
+        "ascii" => Ok(None),
+        "binary" => Ok(Some(Body { bytes: reader.take(expected)?.into(), by_field: false })),
+        "binary_compressed" => {
+            let packed = reader.scalar(Scalar::U32, Endian::Little)? as usize;
+            let size = reader.scalar(Scalar::U32, Endian::Little)? as usize;
+            if size != expected {
+                let problem = format!(
+                    "{size} bytes announced, {} points of {} bytes expected",
+                    header.count(),
+                    header.record()
+                );
+                return Err(Problem::at(format!("byte {}", reader.position() - 4), problem));
+            }
+            Ok(Some(Body { bytes: lzf::expand(reader.take(packed)?, size)?.into(), by_field: true }))
+        }
+        other => {
+            let problem = format!("DATA {other}: ascii, binary or binary_compressed expected");
+            Err(Problem::at(reader.here(), problem))
+        }
+    }
 }
 
 fn header(reader: &mut Reader<'_>) -> Result<Header, Problem> {
@@ -174,7 +193,7 @@ fn header(reader: &mut Reader<'_>) -> Result<Header, Problem> {
     if header.height == 0 && header.width == 0 {
         (header.width, header.height) = (points.unwrap_or(0), 1);
     }
-    let size = header.width.saturating_mul(header.height);
+    let size = header.count();
     if points.is_some_and(|points| points != size) || size > MOST_POINTS {
         let problem = format!("{} × {} points do not agree with POINTS", header.width, header.height);
         return Err(Problem::at("header", problem));

@@ -6,7 +6,7 @@ use glam::{DMat4, DVec2};
 use image::{ImageReader, Limits, RgbaImage};
 use thiserror::Error;
 
-use super::{ScanError, extension, pcd, read_bytes, read_cloud, read_depth, read_poses};
+use super::{ScanError, cloud_of, extension, pcd, read_bytes, read_depth, read_poses};
 use crate::{
     ar::{RoomCamera, RoomPicture, RoomPictureError},
     placement::{Intrinsics, PointCloud},
@@ -72,13 +72,13 @@ impl RecordedRoom {
     /// # Errors
     /// [`RoomError`] when a file cannot be read or the cloud has neither rows nor colours.
     pub fn from_cloud(path: &Path, image: Option<&Path>) -> Result<Self, RoomError> {
-        let cloud = read_cloud(path)?;
+        let bytes = read_bytes(path)?;
+        let cloud = cloud_of(path, &bytes)?;
         let no_colour = || RoomError::NoColour { file: path.into() };
         let (columns, rows) = cloud.layout().ok_or_else(no_colour)?;
         let colour = match image {
             Some(image) => read_picture(image)?,
             None => {
-                let bytes = read_bytes(path)?;
                 let colours = (extension(path) == "pcd")
                     .then(|| pcd::colours(&bytes))
                     .transpose()
@@ -186,27 +186,7 @@ fn read_picture(path: &Path) -> Result<RgbaImage, RoomError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ar::synthetic::SyntheticRoom;
-
-    /// An organised PCD file with colours.
-    fn pcd(picture: &RoomPicture) -> Vec<u8> {
-        let (width, height) = picture.colour.dimensions();
-        let mut bytes = format!(
-            "VERSION 0.7\nFIELDS x y z rgba\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH {width}\nHEIGHT \
-             {height}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {}\nDATA binary\n",
-            width * height
-        )
-        .into_bytes();
-        for (column, row, colour) in picture.colour.enumerate_pixels() {
-            let point = picture.point_m(column, row).map_or(glam::Vec3::NAN, |point| {
-                (picture.camera.rotation * (point - picture.camera.position_m)).as_vec3()
-            });
-            bytes.extend(point.to_array().iter().flat_map(|value| value.to_le_bytes()));
-            let [red, green, blue, _] = colour.0;
-            bytes.extend([blue, green, red, 255]);
-        }
-        bytes
-    }
+    use crate::ar::synthetic::{SyntheticRoom, to_pcd};
 
     #[test]
     fn a_cloud_brings_its_own_picture() {
@@ -214,7 +194,7 @@ mod tests {
         let seen = room.picture(&room.cameras()[0].resized(160, 120));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("room.pcd");
-        std::fs::write(&path, pcd(&seen)).unwrap();
+        std::fs::write(&path, to_pcd(&seen)).unwrap();
         let read = RecordedRoom::from_cloud(&path, None).unwrap();
         assert!(read.picture.colour == seen.colour);
         assert!(read.picture.camera.focal_px.distance(seen.camera.focal_px) < 0.01);
@@ -227,7 +207,7 @@ mod tests {
         std::fs::write(&image, b"no picture").unwrap();
         assert!(matches!(RecordedRoom::from_cloud(&path, Some(&image)), Err(RoomError::Picture { .. })));
         // Cut short, or without colours.
-        let bytes = pcd(&seen);
+        let bytes = to_pcd(&seen);
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         assert!(RecordedRoom::from_cloud(&path, None).is_err());
         let plain = String::from_utf8_lossy(&bytes[..170]).replace("rgba", "odd_");

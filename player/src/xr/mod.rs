@@ -26,4 +26,5 @@ mod table;
 
 pub use cost::Cost;
 pub use error::XrError;
+pub use ffi::clock::thread_cpu_time;
 pub use run::{XrFigures, XrOptions, run};

@@ -4,20 +4,22 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
 use wgpu::{
-    AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferDescriptor,
-    BufferUsages, Color, ColorTargetState, ColorWrites, CommandEncoder, Device, Extent3d, FilterMode,
-    FragmentState, LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor, PrimitiveState,
-    PrimitiveTopology, Queue, RenderPass, RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline,
-    RenderPipelineDescriptor, SamplerBindingType, SamplerDescriptor, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages, StoreOp, TextureDescriptor, TextureDimension, TextureFormat, TextureSampleType,
-    TextureUsages, TextureView, TextureViewDimension, VertexBufferLayout, VertexState, VertexStepMode,
-    vertex_attr_array,
+    BufferUsages, Color, ColorTargetState, ColorWrites, CommandEncoder, Device, Extent3d, FragmentState,
+    LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor, PrimitiveState, PrimitiveTopology, Queue,
+    RenderPass, RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor,
+    SamplerBindingType, ShaderModuleDescriptor, ShaderSource, ShaderStages, StoreOp, TextureDescriptor,
+    TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureView, TextureViewDimension,
+    VertexBufferLayout, VertexState, VertexStepMode, vertex_attr_array,
 };
 
-use super::super::{
-    PictureFormat, Renderer,
-    pipelines::{Kind, Mixing, build},
+use super::{
+    super::{
+        PictureFormat, Renderer,
+        pipelines::{Kind, Mixing, build},
+    },
+    linear_sampler,
 };
 use crate::scene::{BodyVertex, SolidVertex};
 
@@ -84,14 +86,7 @@ impl Cast {
             usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let sampler = device.create_sampler(&SamplerDescriptor {
-            label: Some("shadow map"),
-            address_mode_u: AddressMode::ClampToEdge,
-            address_mode_v: AddressMode::ClampToEdge,
-            mag_filter: FilterMode::Linear,
-            min_filter: FilterMode::Linear,
-            ..Default::default()
-        });
+        let sampler = linear_sampler(device, "shadow map");
         let (casting_layout, caught_layout) = layouts(device);
         let casting = device.create_bind_group(&BindGroupDescriptor {
             label: Some("casting"),

@@ -9,7 +9,10 @@ mod layer;
 
 use glam::Vec3;
 use protocol::pitch::Pitch;
-use wgpu::{CommandEncoder, Device, Queue, TextureViewDescriptor, vertex_attr_array};
+use wgpu::{
+    AddressMode, CommandEncoder, Device, FilterMode, Queue, Sampler, SamplerDescriptor,
+    TextureViewDescriptor, vertex_attr_array,
+};
 
 use super::{
     PictureFormat, Renderer, Surroundings, Target,
@@ -139,4 +142,16 @@ impl RealTable {
         });
         self.composite.draw(device, queue, encoder, layer, &finished, light.extend(opacity as f32));
     }
+}
+
+/// Samples a picture between its pixels; outside it the border goes on.
+fn linear_sampler(device: &Device, label: &str) -> Sampler {
+    device.create_sampler(&SamplerDescriptor {
+        label: Some(label),
+        address_mode_u: AddressMode::ClampToEdge,
+        address_mode_v: AddressMode::ClampToEdge,
+        mag_filter: FilterMode::Linear,
+        min_filter: FilterMode::Linear,
+        ..Default::default()
+    })
 }

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-/// Time that this thread has spent on a processor.
-pub(in crate::xr) fn thread_cpu_time() -> Duration {
+/// Time that this thread has spent on a processor; where the system does not tell, wall time, which is more, with a warning.
+#[must_use]
+pub fn thread_cpu_time() -> Duration {
     #[cfg(unix)]
     {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -15,9 +16,12 @@ pub(in crate::xr) fn thread_cpu_time() -> Duration {
     }
     #[cfg(not(unix))]
     {
-        // No such clock in the standard library: wall time is an upper bound.
         static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-        START.get_or_init(std::time::Instant::now).elapsed()
+        let start = START.get_or_init(|| {
+            tracing::warn!("this system does not tell a thread's processor time: wall time stands for it");
+            std::time::Instant::now()
+        });
+        start.elapsed()
     }
 }
 
