@@ -17,6 +17,8 @@ use crate::placement::{
 pub(super) struct Table {
     placement: Placement,
     hands: [HandState; 2],
+    /// Hands whose press began on something else: not ours until it ends.
+    pressed_elsewhere: [bool; 2],
     surfaces: usize,
     /// Where a match nobody has placed is drawn.
     floating: TabletopPose,
@@ -27,6 +29,7 @@ impl Table {
         Self {
             placement: Placement::new(pitch, Options::headset(room::UP)),
             hands: [HandState::default(); 2],
+            pressed_elsewhere: [false; 2],
             surfaces: 0,
             floating: room::before_the_user(),
         }
@@ -58,7 +61,10 @@ impl Table {
         self.placement.handle(Event::Viewer(Ray { origin_m: head_m, direction: head * DVec3::NEG_Z }), now);
         for (index, pointer) in [(0, Pointer::Left), (1, Pointer::Right)] {
             let (before, is) = (self.hands[index], hands[index]);
-            let away = elsewhere[index] && !before.select;
+            let begins_elsewhere = elsewhere[index] && !before.select;
+            let pressed_elsewhere = is.select && (self.pressed_elsewhere[index] || begins_elsewhere);
+            self.pressed_elsewhere[index] = pressed_elsewhere;
+            let away = pressed_elsewhere || begins_elsewhere;
             let state = if away { HandState::default() } else { is };
             match state.ray {
                 Some((origin_m, direction)) => {
@@ -75,8 +81,7 @@ impl Table {
             if state.squeeze && !before.squeeze {
                 self.placement.handle(Event::Cancel, now);
             }
-            // A press that began elsewhere is over only when it ends.
-            self.hands[index] = HandState { select: state.select, ..state };
+            self.hands[index] = state;
         }
         while let Some(output) = self.placement.poll_output() {
             match output {
@@ -145,7 +150,11 @@ mod tests {
         step(&mut table, hand(true), [false, true]);
         step(&mut table, hand(false), [false, true]);
         assert_eq!(table.stands(), (1, false));
+        // Pressed on the panel, slid off it, let go.
+        step(&mut table, hand(true), [false, true]);
+        step(&mut table, hand(true), [false; 2]);
         step(&mut table, hand(false), [false; 2]);
+        assert_eq!(table.stands(), (1, false));
         step(&mut table, hand(true), [false; 2]);
         step(&mut table, hand(false), [false; 2]);
         assert_eq!(table.stands(), (1, true));
