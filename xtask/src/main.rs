@@ -5,6 +5,7 @@
 mod bench;
 mod dataset;
 mod demo;
+mod goldens;
 mod openxr;
 mod process;
 mod setup;
@@ -34,6 +35,12 @@ enum Command {
     },
     /// Run everything CI runs
     Test,
+    /// Draw the kept pictures of the tests anew: look at each before you commit it
+    Goldens {
+        /// First reconstruct the excerpt of the demo stream that they show
+        #[arg(long)]
+        stream: bool,
+    },
     /// Measure decode, upload, draw and seek of the demo stream
     Bench,
     /// Make a data set under target/datasets
@@ -51,6 +58,7 @@ fn main() -> ExitCode {
         Command::Setup => setup::everything(),
         Command::Demo { no_window } => demo::run(no_window),
         Command::Test => test::run(),
+        Command::Goldens { stream } => goldens::run(stream),
         Command::Bench => bench::run(),
         Command::Dataset { name, count } => dataset::run(name, count),
     };

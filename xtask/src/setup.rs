@@ -100,7 +100,15 @@ pub(crate) fn install_headset_tools() -> Result<()> {
 
 /// Environment of the programs that xtask starts: where the downloaded library is, and software Vulkan for tests.
 pub(crate) fn environment() -> Vec<(&'static str, OsString)> {
-    vec![("HOLOPITCH_ONNXRUNTIME", library().into_os_string())]
+    let mut variables = vec![("HOLOPITCH_ONNXRUNTIME", library().into_os_string())];
+    // Mesa complains on standard error about machines without one, once for every device.
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        let run = folder().join("run");
+        if fs::create_dir_all(&run).is_ok() {
+            variables.push(("XDG_RUNTIME_DIR", run.into_os_string()));
+        }
+    }
+    variables
 }
 
 /// The Vulkan driver file of lavapipe, so that pictures are the same on every machine.

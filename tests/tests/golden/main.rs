@@ -6,8 +6,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod room;
-mod snapshot;
 
+use holopitch_tests::{
+    excerpt,
+    snapshot::{Snapshot, compare},
+};
 use image::RgbaImage;
 use player::{
     camera::{CameraFile, Preset, ViewCamera},
@@ -15,7 +18,6 @@ use player::{
     scene::{FrameScene, Stage},
 };
 use protocol::{chunk::ChunkFrame, limits::Limits, pitch::Pitch, sample};
-use snapshot::{Snapshot, compare};
 
 const SIZE_PX: (u32, u32) = (480, 270);
 const ASPECT: f64 = 480.0 / 270.0;
@@ -79,6 +81,23 @@ fn two_people_and_the_ball_up_close() {
     };
     let drawn = draw(&gpu, &frame(), &camera.view(ASPECT));
     Snapshot::new("close", drawn).matches_within(MEAN, WORST_BLOCK);
+}
+
+/// What a viewer gets: players as the reconstructor made them from the demo clip, from beside the broadcast camera.
+#[test]
+fn reconstructed_players_up_close() {
+    let Some(gpu) = software_adapter() else { return };
+    let frame = excerpt::frame();
+    let anchors = || frame.bodies.iter().map(|body| body.anchor_m.as_dvec3());
+    let middle = anchors().sum::<glam::DVec3>() / frame.bodies.len() as f64;
+    let central = anchors().min_by(|a, b| a.distance(middle).total_cmp(&b.distance(middle))).unwrap();
+    let camera = CameraFile::LookAt {
+        position_m: central + glam::DVec3::new(9.0, 5.0, 14.0),
+        target_m: central + glam::DVec3::Y,
+        vertical_fov_degrees: 30.0,
+    };
+    let drawn = draw(&gpu, &frame, &camera.view(ASPECT));
+    Snapshot::new("reconstructed", drawn).matches_within(MEAN, WORST_BLOCK);
 }
 
 /// The bounds are worth something: a person who is missing, half a metre off, or drawn without their texture shows.

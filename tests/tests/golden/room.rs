@@ -1,9 +1,13 @@
 //! The match on the table of a synthesized room: three cameras, with a cup or a box in front, and a ghost.
 //!
-//! Room and match are both drawn by rule (`player::ar::synthetic`, `protocol::sample`), so the kept pictures hold
-//! nothing that somebody recorded.
+//! The room is drawn by rule (`player::ar::synthetic`), the match is the excerpt of the demo stream, so the kept pictures
+//! hold nothing that somebody recorded.
 
 use glam::DVec3;
+use holopitch_tests::{
+    excerpt,
+    snapshot::{Snapshot, compare},
+};
 use image::RgbaImage;
 use player::{
     ar::{RoomLight, synthetic::SyntheticRoom},
@@ -16,7 +20,7 @@ use player::{
 };
 use protocol::{limits::Limits, pitch::Pitch};
 
-use super::{MEAN, WORST_BLOCK, frame, snapshot::Snapshot, snapshot::compare, software_adapter};
+use super::{MEAN, WORST_BLOCK, software_adapter};
 
 /// The table as if nothing stood on it: the match then lies behind the cup and around the box.
 fn ignoring_things(room: &SyntheticRoom) -> Surface {
@@ -33,7 +37,7 @@ fn draw(table: &Surface, view: usize, opacity: f64, depth: bool) -> Option<RgbaI
     let wish = Wish { viewer_m: Some(room.cameras()[0].position_m), ..Wish::of(Pitch::default()) };
     let pose = fit(table, &Wish { facing: Facing::LongerSide, ..wish }).unwrap();
     let light = RoomLight::estimate(&room.picture(&room.cameras()[0]), table);
-    let scene = FrameScene::new(&frame(), &[], &Limits::default()).unwrap();
+    let scene = FrameScene::new(&excerpt::frame(), &[], &Limits::default()).unwrap();
     let on_table = OnTable { pose, light, opacity };
     Some(gpu.picture_in_room(Pitch::default(), &scene, &picture, &on_table).unwrap())
 }

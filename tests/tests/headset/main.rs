@@ -6,15 +6,16 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod runtime;
-#[path = "../golden/snapshot.rs"]
-mod snapshot;
 mod stalling_server;
 
 use std::{fs, path::Path, sync::Mutex, thread, time::Duration};
 
+use holopitch_tests::{
+    excerpt,
+    snapshot::{self, Snapshot},
+};
 use protocol::{manifest::FILE_NAME, sample};
 use runtime::{Head, Runtime, figures, folder, succeeded};
-use snapshot::Snapshot;
 
 /// One runtime at a time: the machine has few processors, and times are measured.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -35,12 +36,14 @@ fn start(head: Head, frames: u32) -> Option<Runtime> {
     Some(runtime)
 }
 
-/// The same head and the same frame give the same pictures, on the table that the layer invents.
+/// The same head and the same frame of the demo stream give the same pictures, on the table that the layer invents.
 #[test]
 fn both_eyes_see_the_match_on_the_runtimes_table() {
     let _alone = ALONE.lock();
-    let Some(runtime) = start(Head::Still, 60) else { return };
-    let arguments = ["--frame", "40", "--place", "--exit-after-frames", "20", "--resolution-scale", "1.5"];
+    let Some(runtime) = folder().map(|root| Runtime::start(root, Head::Still)) else { return };
+    excerpt::copy_to(&runtime.shared.path().join("stream"));
+    let at = excerpt::FRAME.to_string();
+    let arguments = ["--frame", &at, "--place", "--exit-after-frames", "20", "--resolution-scale", "1.5"];
     let script = ["--capture", "/mnt/out/eyes", "--json", "/mnt/out/figures.json"];
     succeeded(&runtime.player("/mnt/stream", &[&arguments[..], &script].concat()).output().unwrap());
     let figures = figures(&runtime.out().join("figures.json"));

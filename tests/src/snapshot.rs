@@ -1,7 +1,7 @@
 //! Pictures compared with the ones kept in `tests/goldens`.
 //!
 //! Near-exact on purpose: the software adapter repeats its pixels, and a loose bound would pass a picture whose
-//! multisampling was lost. `HOLOPITCH_UPDATE_GOLDENS=1` replaces the kept pictures by what is drawn now.
+//! multisampling was lost. `cargo xtask goldens` (`HOLOPITCH_UPDATE_GOLDENS=1`) replaces them by what is drawn now.
 
 use std::{
     fs,
@@ -61,7 +61,7 @@ impl Snapshot {
         }
         let kept = image::open(&kept_path).map(DynamicImage::into_rgba8);
         let kept = kept.unwrap_or_else(|error| {
-            panic!("{}: {error}: HOLOPITCH_UPDATE_GOLDENS=1 draws it", kept_path.display())
+            panic!("{}: {error}: `cargo xtask goldens` draws it", kept_path.display())
         });
         let difference = compare(&kept, &self.drawn);
         println!("{}: {difference:?}", self.name);
@@ -123,7 +123,7 @@ fn goldens() -> PathBuf {
 }
 
 fn failures() -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("goldens");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/goldens");
     fs::create_dir_all(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     folder
 }
