@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use crate::{
     body::{BaseBody, Bone, Part, ShapedBody},
     landmarks,
-    outfit::{Hair, Outfit, Sleeves},
+    outfit::{Hair, Outfit, Sleeves, Tied},
 };
 
 /// What a surface is made of.
@@ -251,6 +251,13 @@ impl Lines<'_> {
         ankle.y - 0.012 * self.scale + 0.25 * (vertex.rest.z - ankle.z - 0.03).max(0.0) - vertex.rest.y
     }
 
+    /// Gloves reach from a little above the wrist to the finger tips.
+    fn glove(&self, vertex: &Vertex) -> f32 {
+        let arm = self.body.head(Bone::UpperArmL).distance(self.body.head(Bone::LowerArmL));
+        let fore = self.body.head(Bone::LowerArmL).distance(self.body.head(Bone::HandL));
+        self.along_arm(vertex) - arm - fore + 0.045 * self.scale
+    }
+
     /// How far inside the hairline a vertex of the head lies.
     fn hair(&self, vertex: &Vertex, hair: &Hair) -> f32 {
         let head = self.body.head(Bone::Head);
@@ -263,6 +270,43 @@ impl Lines<'_> {
         let nape = p.y + 0.035 + hair.nape_m;
         (p.y - line).min(nape).min(0.04)
     }
+}
+
+/// A knot or tail at the back of the head: an egg that follows the head.
+fn tied_hair(body: &ShapedBody, style: &Hair, scale: f32) -> Piece {
+    const RINGS: usize = 6;
+    const SECTORS: usize = 10;
+    // Centre behind the crown, half axes across, along and away from the head.
+    let (centre, half) = match style.tied {
+        Tied::No => return Piece::default(),
+        Tied::Knot(radius) => (Vec3::new(0.0, 0.13, -0.10 - 0.5 * radius), Vec3::splat(radius)),
+        Tied::Tail(length) => {
+            (Vec3::new(0.0, 0.09 - length / 2.0, -0.115), Vec3::new(0.028, length / 2.0, 0.026))
+        }
+    };
+    let mut piece = Piece::default();
+    for ring in 0..=RINGS {
+        let polar = ring as f32 / RINGS as f32 * std::f32::consts::PI;
+        for sector in 0..SECTORS {
+            let turn = sector as f32 / SECTORS as f32 * std::f32::consts::TAU;
+            let normal = Vec3::new(polar.sin() * turn.sin(), polar.cos(), polar.sin() * turn.cos());
+            piece.vertices.push(Vertex {
+                rest: body.head(Bone::Head) + (centre + normal * half) * scale,
+                normal,
+                hem_m: 1.0,
+                bones: [Bone::Head as u8, 0, 0, 0],
+                weights: [1.0, 0.0, 0.0, 0.0],
+            });
+        }
+    }
+    for ring in 0..RINGS {
+        for sector in 0..SECTORS {
+            let at = |r: usize, s: usize| (r * SECTORS + s % SECTORS) as u32;
+            piece.triangles.push([at(ring, sector), at(ring + 1, sector), at(ring, sector + 1)]);
+            piece.triangles.push([at(ring, sector + 1), at(ring + 1, sector), at(ring + 1, sector + 1)]);
+        }
+    }
+    piece
 }
 
 /// Dresses a body.
@@ -300,10 +344,18 @@ pub fn dress(base: &BaseBody, body: ShapedBody, outfit: Outfit, detail: Detail) 
         Some(style) => bare.split(|v| lines.hair(v, style)),
         None => [Piece::default(), bare],
     };
+    let bare = if outfit.gloves.is_some() {
+        let [gloves, bare] = bare.split(|v| lines.glove(v));
+        figure.add(gloves.inflated(|_| 0.009 * scale), Material::Skin);
+        bare
+    } else {
+        bare
+    };
     figure.add(bare, Material::Skin);
     if let Some(style) = &outfit.hair {
         let hair = hair.inflated(|v| style.volume_m * scale * (v.hem_m / 0.03).clamp(0.1, 1.0));
         figure.add(hair, Material::Hair);
+        figure.add(tied_hair(&body, style, scale), Material::Hair);
     }
     figure.add(Piece::of(base, &body, &normals, Part::Eyes).simplified(0.3, 0.002), Material::Eye);
     figure.add(socks.inflated(|_| 0.003), Material::Sock);

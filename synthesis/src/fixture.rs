@@ -7,29 +7,18 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::{
     SynthesisError,
-    body::{BaseBody, Build},
-    figure::{Detail, Figure, dress},
-    motion::Motions,
-    movement::{Habits, Movement, kicks},
+    cast::Cast,
     operator::{Tripod, follow},
-    outfit::{Kit, Outfit, Pattern},
     overlay::ScoreBoard,
     paint::Lights,
     props,
     render::{Actor, Scene, Solid},
     rig,
     stadium::{Board, Stadium},
-    trajectories::{Path2, Role, Trajectories},
+    trajectories::Trajectories,
 };
 
-/// Somebody in the match.
-pub struct Member {
-    /// Path, team, role and number.
-    pub path: Path2,
-    /// Shape and clothes.
-    pub figure: Figure,
-    movement: Movement,
-}
+pub use crate::cast::Member;
 
 /// A match that can be rendered frame by frame, in any order.
 pub struct Fixture {
@@ -63,28 +52,6 @@ pub struct FixtureOptions {
     pub tripod: Tripod,
 }
 
-fn kit(id: &str, pattern: Pattern, [shirt, second, trim, shorts, socks, number]: [[f32; 3]; 6]) -> Kit {
-    Kit { id: id.into(), shirt, second, pattern, trim, shorts, socks, number }
-}
-
-/// Home, away, both goalkeepers, officials.
-fn kits() -> [Kit; 5] {
-    const WHITE: [f32; 3] = [0.94, 0.94, 0.95];
-    const NAVY: [f32; 3] = [0.06, 0.09, 0.24];
-    const RED: [f32; 3] = [0.76, 0.07, 0.11];
-    const BLACK: [f32; 3] = [0.06, 0.06, 0.07];
-    const YELLOW: [f32; 3] = [0.93, 0.84, 0.12];
-    const ORANGE: [f32; 3] = [0.95, 0.45, 0.08];
-    const SKY: [f32; 3] = [0.40, 0.70, 0.92];
-    [
-        kit("harbour-home", Pattern::Plain, [WHITE, NAVY, NAVY, WHITE, WHITE, NAVY]),
-        kit("forge-away", Pattern::Stripes(0.075), [RED, BLACK, BLACK, BLACK, RED, WHITE]),
-        kit("harbour-keeper", Pattern::Plain, [YELLOW, BLACK, BLACK, YELLOW, YELLOW, BLACK]),
-        kit("forge-keeper", Pattern::Plain, [ORANGE, BLACK, BLACK, ORANGE, ORANGE, BLACK]),
-        kit("officials", Pattern::Plain, [SKY, BLACK, BLACK, BLACK, BLACK, BLACK]),
-    ]
-}
-
 fn boards() -> Vec<Board> {
     let board = |text: &str, ground, ink| Board { text: text.into(), ground, ink };
     vec![
@@ -107,42 +74,14 @@ impl Fixture {
         let paths = paths.resampled(options.start_seconds, options.rate_hz, options.frames);
         let rng = &mut Pcg64Mcg::seed_from_u64(options.seed);
         let mut stadium = Stadium::new(Pitch::default(), boards(), Lights::floodlights(), rng.random());
-        stadium.crowd = vec![[0.90, 0.90, 0.92], [0.08, 0.11, 0.30], [0.70, 0.10, 0.12]];
-        let base = BaseBody::load()?;
-        let motions = Motions::shipped()?;
         let rate = options.rate_hz as f32;
-        let strikes = kicks(&paths.people, &paths.ball, rate);
-        let mut members = Vec::with_capacity(paths.people.len());
-        for (index, path) in paths.people.iter().enumerate() {
-            let [home, away, home_keeper, away_keeper, officials] = kits();
-            let kit = match (path.team, path.role) {
-                (Some(0), Role::Goalkeeper) => home_keeper,
-                (Some(_), Role::Goalkeeper) => away_keeper,
-                (Some(0), _) => home,
-                (Some(_), _) => away,
-                (None, _) => officials,
-            };
-            let mut build = Build::random(rng);
-            build.female = if path.role == Role::Assistant && index % 2 == 0 { 1.0 } else { 0.0 };
-            let mut outfit = Outfit::random(rng, kit, path.number);
-            if path.role == Role::Goalkeeper {
-                outfit.sleeves = crate::outfit::Sleeves::Long;
-            }
-            let figure = dress(&base, base.shape(&build), outfit, Detail::Close);
-            let habits = Habits {
-                mood: rng.random_range(0.0..1.0),
-                phase: rng.random_range(0.0..1.0),
-                size: build.height_m / 1.8,
-            };
-            let own: Vec<usize> =
-                strikes.iter().filter(|(who, _)| *who == index).map(|&(_, frame)| frame).collect();
-            let movement = Movement::along(path, &paths.ball, rate, &motions, habits, &own)?;
-            members.push(Member { path: path.clone(), figure, movement });
-        }
+        let Cast { members, wardrobe } = Cast::new(&paths, rate, options.seed)?;
+        let colours = wardrobe.teams.each_ref().map(|kit| kit.shirt);
+        stadium.crowd = vec![[0.90, 0.90, 0.92], colours[0], colours[1], [0.10, 0.11, 0.16]];
         let cameras = follow(&options.tripod, options.size_px, &paths.ball, &paths.people, rate);
         let score = ScoreBoard {
             teams: ["HAR".into(), "FOR".into()],
-            colours: [[0.94, 0.94, 0.95], [0.76, 0.07, 0.11]],
+            colours,
             score: [1, 0],
             clock_seconds: 27 * 60 + 14,
         };

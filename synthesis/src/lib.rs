@@ -8,7 +8,9 @@
 
 use std::path::PathBuf;
 
+pub mod acts;
 pub mod body;
+pub mod cast;
 pub mod clip;
 pub mod correspondences;
 pub mod dataset;
@@ -16,6 +18,7 @@ pub mod figure;
 pub mod fixture;
 pub mod gait;
 mod landmarks;
+pub mod legs;
 pub mod lettering;
 pub mod motion;
 pub mod movement;
@@ -35,6 +38,7 @@ pub mod stadium;
 mod stands;
 pub mod trajectories;
 pub mod truth;
+pub mod wardrobe;
 
 pub use clip::{Options, Synthesized, synthesize};
 

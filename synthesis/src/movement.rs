@@ -198,7 +198,8 @@ mod tests {
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(4);
         let build = Build { female: 0.0, origin: [0.3, 0.3, 0.4], muscle: 0.2, weight: 0.0, height_m: 1.8 };
         let kit = Kit::random(&mut rng, "k".into());
-        let figure = dress(&base, base.shape(&build), Outfit::random(&mut rng, kit, None), Detail::Broadcast);
+        let figure =
+            dress(&base, base.shape(&build), Outfit::random(&mut rng, kit, None, false), Detail::Broadcast);
         let motions = Motions::shipped().unwrap();
         for speed in [1.2, 4.0] {
             let (path, ball) = straight(speed);

@@ -117,7 +117,11 @@ pub fn albedo(figure: &Figure, point: &SurfacePoint) -> Vec3 {
                     f32::from(u8::from(!sleeve && (rest.x - rest.y + 0.3).abs() < wide && rest.z > 0.0))
                 }
             };
-            shirt.lerp(second, mix)
+            let cloth = shirt.lerp(second, mix);
+            match sponsor(figure, rest).filter(|_| !sleeve) {
+                Some((ink, colour)) => cloth.lerp(colour, ink),
+                None => cloth,
+            }
         }
         Material::Shorts => {
             let side = Vec2::new(rest.z - figure.body.hips().z, 0.0).x.abs();
@@ -143,6 +147,14 @@ fn skin(figure: &Figure, rest: Vec3) -> Vec3 {
     let base = linear(outfit.skin);
     let head = figure.body.head(Bone::Head);
     let p = rest - head;
+    if let Some(glove) = outfit.gloves {
+        let [_, elbow, wrist] =
+            crate::body::ARMS[usize::from(rest.x < 0.0)].map(|bone| figure.body.head(bone));
+        let beyond = (rest - wrist).dot((wrist - elbow).normalize_or(Vec3::X));
+        if beyond > -0.05 && rest.distance(wrist) < 0.3 {
+            return linear(glove) * if beyond < -0.015 { 0.45 } else { 1.0 };
+        }
+    }
     let mut colour = base;
     if p.y > -0.06 && p.z > 0.05 && p.x.abs() < 0.08 {
         // Sockets and brows, and the mouth: dark at a distance, they make a face read as one.
@@ -183,6 +195,28 @@ fn shirt_number(figure: &Figure, rest: Vec3) -> Option<f32> {
         && place.y > -0.3
         && place.y < lettering::HEIGHT + 0.3;
     inside.then(|| lettering::ink(&text, place, 0.24, 0.06))
+}
+
+/// The sponsor's block at a rest point of the chest: how much of it covers the cloth there, and its colour.
+fn sponsor(figure: &Figure, rest: Vec3) -> Option<(f32, Vec3)> {
+    let sponsor = figure.outfit.kit.sponsor.as_ref()?;
+    let chest = figure.body.head(Bone::Spine3);
+    if rest.z < chest.z + 0.05 {
+        return None;
+    }
+    let wide = lettering::width(&sponsor.text);
+    let glyph_m = (0.25 / wide).min(0.034);
+    let place = Vec2::new(rest.x / glyph_m + wide / 2.0, (chest.y + 0.035 - rest.y) / glyph_m);
+    let edge = 0.5;
+    let inside =
+        place.x > -edge && place.x < wide + edge && place.y > -edge && place.y < lettering::HEIGHT + edge;
+    inside.then(|| {
+        let ink = lettering::ink(&sponsor.text, place, 0.26, 0.08);
+        match sponsor.bar {
+            Some(bar) => (1.0, linear(bar).lerp(linear(sponsor.ink), ink)),
+            None => (ink, linear(sponsor.ink)),
+        }
+    })
 }
 
 /// Light leaving a surface point.

@@ -40,7 +40,7 @@ impl Cast {
                 let mut kit_rng = Pcg64Mcg::seed_from_u64(0x5117_0000 + u64::from(kit_id));
                 let kit = Kit::random(&mut kit_rng, format!("kit{kit_id}"));
                 let number = rng.random_bool(0.85).then(|| rng.random_range(1..40));
-                let outfit = Outfit::random(&mut rng, kit, number);
+                let outfit = Outfit::random(&mut rng, kit, number, build.female > 0.5);
                 (dress(base, base.shape(&build), outfit, Detail::Close), body_id)
             })
             .collect();
