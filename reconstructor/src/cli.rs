@@ -100,6 +100,9 @@ pub(crate) struct Synthesize {
     /// Recorded paths of players and ball; made up when not given.
     #[arg(long, value_name = "FILE")]
     pub(crate) trajectories: Option<PathBuf>,
+    /// Also write every frame's maps: people, lines, first and last surfaces (PNG).
+    #[arg(long)]
+    pub(crate) maps: bool,
 }
 
 #[derive(Debug, Subcommand)]

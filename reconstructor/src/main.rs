@@ -140,6 +140,7 @@ fn run_synthesize(arguments: cli::Synthesize) -> Result<()> {
         frames: arguments.frames,
         size_px: arguments.size,
         trajectories: arguments.trajectories,
+        maps: arguments.maps,
         ..synthesis::Options::default()
     };
     let progress = Progress::new("synthesis", u64::from(options.frames));

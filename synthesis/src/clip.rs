@@ -19,7 +19,7 @@ use crate::{
     render::Window,
     sensor::Sensor,
     trajectories::Trajectories,
-    truth::{self, FrameTruth, Reduced, Truth},
+    truth::{self, Reduced, TruthOptions, TruthWriter},
 };
 
 /// Frames per second of every rendered clip.
@@ -28,7 +28,7 @@ pub const FRAME_RATE: u32 = 25;
 /// What to render.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Folder for `clip.mp4`, `truth/`, `truth.json` and `correspondences.json`; made when missing.
+    /// Folder for the clip and the files of its truth; made when missing.
     pub out: PathBuf,
     /// Everything random follows from it.
     pub seed: u64,
@@ -42,6 +42,8 @@ pub struct Options {
     pub start_seconds: f64,
     /// Triangles of each true surface, about.
     pub truth_triangles: u32,
+    /// Whether every frame's maps are written too: people, lines, first and last surfaces.
+    pub maps: bool,
     /// Quality of the H.264 file: x264's CRF, 0 (best) to 51.
     pub crf: u8,
 }
@@ -56,6 +58,7 @@ impl Default for Options {
             trajectories: None,
             start_seconds: 0.0,
             truth_triangles: 1500,
+            maps: false,
             crf: 20,
         }
     }
@@ -72,14 +75,8 @@ pub struct Synthesized {
     pub frames: usize,
     /// People in view per frame, on average.
     pub people_in_view_mean: f64,
-}
-
-/// One rendered frame with its truth.
-pub struct RenderedFrame {
-    /// The picture.
-    pub picture: RgbImage,
-    /// What is in it.
-    pub truth: FrameTruth,
+    /// Bytes of the truth, all files.
+    pub truth_bytes: u64,
 }
 
 /// Renders a frame of a match: the picture that the broadcast shows.
@@ -137,7 +134,16 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
 
     let clip = options.out.join("clip.mp4");
     let mut video = Video::start(&clip, options)?;
-    let (mut frames, mut stream) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let mut writer = TruthWriter::create(
+        &options.out,
+        TruthOptions {
+            frame_rate: FRAME_RATE,
+            size_px: options.size_px,
+            triangles: options.truth_triangles,
+            maps: options.maps,
+        },
+    )?;
+    let (mut done, mut in_view) = (0, 0);
     let together = rayon::current_num_threads().max(1);
     for first in (0..count).step_by(together) {
         let batch: Vec<_> = (first..(first + together).min(count))
@@ -145,55 +151,34 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
             .map(|frame| {
                 let picture = render_frame(&fixture, frame, options.seed)?;
                 let scene = fixture.scene(frame);
-                let truth = truth::frame_truth(&fixture, &scene, frame);
+                let (truth, maps) = truth::measure(&fixture, &scene, frame, options.maps);
                 let bodies = truth::stream_frame(&fixture, &scene, &truth, &reduced, &palette);
-                Ok((picture, truth, bodies))
+                Ok((picture, truth, maps, bodies))
             })
             .collect::<Result<_, SynthesisError>>()?;
-        for (picture, truth, bodies) in batch {
+        for (picture, truth, maps, bodies) in batch {
             video.push(&picture)?;
-            frames.push(truth);
-            stream.push(bodies);
-            progress(frames.len());
+            in_view += truth.people.iter().filter(|person| person.in_view).count();
+            writer.push(&truth, maps.as_ref(), bodies)?;
+            done += 1;
+            progress(done);
         }
     }
     video.finish()?;
 
-    let in_view: usize = frames.iter().map(|f| f.people.iter().filter(|p| p.in_view).count()).sum();
-    truth::write_stream(&options.out.join("truth"), &fixture, stream, FRAME_RATE, options.truth_triangles)?;
+    let truth_bytes = writer.finish(&fixture)?;
     let mut rng = Pcg64Mcg::seed_from_u64(options.seed ^ 0xC11C);
     let points = clicked(&fixture.cameras[0], &fixture.stadium.pitch, 0, 10, &mut rng);
-    put_json(&options.out.join("correspondences.json"), &points, Layout::Indented)?;
-    let truth = Truth {
-        frame_rate: [FRAME_RATE, 1],
-        pitch: fixture.stadium.pitch,
-        people: truth::people_truth(&fixture.members),
-        frames,
-    };
-    put_json(&options.out.join("truth.json"), &truth, Layout::Compact)?;
+    let text = serde_json::to_string_pretty(&points)
+        .map_err(|error| SynthesisError::Options(format!("correspondences.json: {error}")))?;
+    truth::put(&options.out.join("correspondences.json"), (text + "\n").as_bytes())?;
     Ok(Synthesized {
         clip,
         generated_paths: options.trajectories.is_none(),
         frames: count,
         people_in_view_mean: in_view as f64 / count as f64,
+        truth_bytes,
     })
-}
-
-enum Layout {
-    Indented,
-    Compact,
-}
-
-fn put_json(path: &Path, value: &impl serde::Serialize, layout: Layout) -> Result<(), SynthesisError> {
-    let text = match layout {
-        Layout::Indented => serde_json::to_string_pretty(value),
-        Layout::Compact => serde_json::to_string(value),
-    };
-    let broken = |error: serde_json::Error| SynthesisError::Asset {
-        what: path.display().to_string(),
-        reason: error.to_string(),
-    };
-    truth::put(path, (text.map_err(broken)? + "\n").as_bytes())
 }
 
 /// An H.264 file being written by the `ffmpeg` program.
@@ -261,7 +246,6 @@ impl Video {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
     use protocol::{chunk, limits::Limits, manifest::Manifest};
 
     fn small(seed: u64) -> Fixture {
@@ -282,36 +266,6 @@ mod tests {
         let first = picture(5);
         assert_eq!(first, picture(5));
         assert_ne!(first, picture(6));
-    }
-
-    #[test]
-    fn true_people_lie_in_their_boxes_and_stand_on_the_pitch() {
-        let fixture = small(5);
-        let scene = fixture.scene(2);
-        let truth = truth::frame_truth(&fixture, &scene, 2);
-        let in_view: Vec<_> = truth.people.iter().filter(|p| p.in_view).collect();
-        assert!(in_view.len() >= 4, "{} people in view", in_view.len());
-        for person in in_view {
-            let [left, top, right, bottom] = person.box_px;
-            for (joint, [x, y]) in person.joints_px.iter().enumerate() {
-                // Knuckles are guessed beyond the wrist and may stick out a little.
-                let slack = 0.12 * (bottom - top);
-                let inside =
-                    *x > left - slack && *x < right + slack && *y > top - slack && *y < bottom + slack;
-                assert!(
-                    inside,
-                    "joint {joint} of person {} at {x}, {y} leaves {:?}",
-                    person.id, person.box_px
-                );
-            }
-            let anchor = DVec3::from(person.anchor_m);
-            assert!(anchor.y.abs() < 1e-9);
-            let hips = (DVec3::from(person.joints_m[23]) + DVec3::from(person.joints_m[24])) / 2.0;
-            assert!((hips - anchor).with_y(0.0).length() < 0.01, "hips over the anchor");
-            assert!((0.5..1.3).contains(&hips.y));
-            let pixel = truth.camera.project(anchor).unwrap();
-            assert!(pixel.x > left && pixel.x < right && pixel.y > top && pixel.y < bottom + 8.0);
-        }
     }
 
     #[test]
@@ -340,10 +294,12 @@ mod tests {
         let bytes = read(&format!("truth/{}", entry.path));
         protocol::hash::verify(&bytes, entry).unwrap();
         let chunk = chunk::decode(&bytes, &Limits::default()).unwrap();
-        let truth: serde_json::Value = serde_json::from_slice(&read("truth.json")).unwrap();
-        assert_eq!(chunk.frames.len(), 2);
+        let lines = String::from_utf8(read("frames.jsonl")).unwrap();
+        let truth: Vec<serde_json::Value> =
+            lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!((chunk.frames.len(), truth.len()), (2, 2));
         for (frame, content) in chunk.frames.iter().enumerate() {
-            let people = truth["frames"][frame]["people"].as_array().unwrap();
+            let people = truth[frame]["people"].as_array().unwrap();
             assert_eq!(content.bodies.len(), people.iter().filter(|p| p["in_view"] == true).count());
             for body in &content.bodies {
                 let lowest = body.mesh.positions_m.iter().map(|p| p[1]).fold(f32::MAX, f32::min);

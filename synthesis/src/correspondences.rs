@@ -36,7 +36,7 @@ pub struct Point {
 }
 
 /// Every point that is easy to recognise.
-fn candidates(pitch: &Pitch) -> Vec<(String, DVec3)> {
+pub(crate) fn candidates(pitch: &Pitch) -> Vec<(String, DVec3)> {
     let (half_x, half_z) = (pitch.length_m / 2.0, pitch.width_m / 2.0);
     let mut all: Vec<(String, DVec3)> = Vec::new();
     let mut add = |name: &str, x: f64, y: f64, z: f64| all.push((name.to_owned(), DVec3::new(x, y, z)));

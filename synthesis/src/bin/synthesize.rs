@@ -5,7 +5,7 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
 use synthesis::{Options, synthesize};
 
 const USAGE: &str = "usage: synthesize --out DIR [--seed N] [--frames N] [--size WxH] [--trajectories FILE.json] [--start SECONDS]
-                  [--truth-triangles N] [--crf N]
+                  [--truth-triangles N] [--crf N] [--maps yes|no]
 
 example: cargo run -p synthesis --bin synthesize -- --out target/clip --seed 7 --frames 50";
 
@@ -25,6 +25,7 @@ fn options() -> Option<Options> {
             "--trajectories" => options.trajectories = Some(value.into()),
             "--start" => options.start_seconds = value.parse().ok()?,
             "--truth-triangles" => options.truth_triangles = value.parse().ok()?,
+            "--maps" => options.maps = value == "yes",
             "--crf" => options.crf = value.parse().ok()?,
             _ => return None,
         }

@@ -132,7 +132,6 @@ fn summary(frames: &[FrameErrors]) -> CalibrationFigures {
 #[derive(Deserialize)]
 struct Truth {
     pitch: Pitch,
-    frames: Vec<TrueFrame>,
 }
 
 #[derive(Deserialize)]
@@ -142,12 +141,12 @@ struct TrueFrame {
 
 fn rendered_clip(data: &Path, progress: &Progress) -> Result<CalibrationFigures, CalibrationEvaluationError> {
     let truth: Truth = parse(&data.join("truth.json"))?;
+    let true_frames: Vec<TrueFrame> = parse_lines(&data.join("frames.jsonl"))?;
     let given = Calibration::read(&data.join("correspondences.json"))?;
     let clip = Clip::open(&data.join("clip.mp4"), None).map_err(CalibrationError::from)?;
     let estimates = calibrate(&clip, &[], &given, progress)?;
     let points = pitch_points(&truth.pitch);
-    let frames: Vec<FrameErrors> = truth
-        .frames
+    let frames: Vec<FrameErrors> = true_frames
         .iter()
         .zip(&estimates)
         .filter_map(|(truth_frame, estimate)| {
@@ -237,6 +236,20 @@ fn read(path: &Path) -> Result<String, CalibrationEvaluationError> {
 fn parse<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, CalibrationEvaluationError> {
     let failed = |reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
     serde_json::from_str(&read(path)?).map_err(|e| failed(e.to_string()))
+}
+
+/// A file with one JSON value per line.
+fn parse_lines<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<T>, CalibrationEvaluationError> {
+    let text = read(path)?;
+    text.lines()
+        .enumerate()
+        .map(|(line, json)| {
+            serde_json::from_str(json).map_err(|error| CalibrationEvaluationError::File {
+                path: path.into(),
+                reason: format!("line {}: {error}", line + 1),
+            })
+        })
+        .collect()
 }
 
 #[cfg(test)]
