@@ -120,6 +120,33 @@ pub(crate) enum Evaluate {
         after_help = "Example:\n  reconstructor evaluate calibration --data assets/demo --json calibration.json"
     )]
     Calibration(EvaluateCalibration),
+    /// How like real broadcasts rendered pictures are: both measured alike, worst measure first.
+    #[command(
+        after_help = "Example:\n  cargo xtask dataset frames-test --count 48\n  reconstructor evaluate realism --real ../shared/data/detection/dfl --ours target/datasets/frames-test --json realism.json"
+    )]
+    Realism(EvaluateRealism),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateRealism {
+    /// Real labelled pictures: `images/` and `labels/` in the YOLO form (classes ball, goalkeeper, player, referee).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) real: PathBuf,
+    /// Rendered pictures in the same form, as `cargo xtask dataset frames-test` writes them.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) ours: PathBuf,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+    /// Also draw real pictures beside rendered ones of the same camera.
+    #[arg(long, value_name = "OUT.png", requires = "annotated")]
+    pub(crate) sheet: Option<PathBuf>,
+    /// Where the sheet's real pictures are: SoccerNet keypoints (`pitch_points.json`, `images/`, `labels/`).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) annotated: Option<PathBuf>,
+    /// The seed of the sheet's first rendered picture.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
 }
 
 #[derive(Debug, Args)]

@@ -29,6 +29,9 @@ use tracing_subscriber::EnvFilter;
 
 use cli::{Cli, Command, Evaluate};
 
+/// Pictures in the sheet of `evaluate realism`.
+const SHEET_ROWS: usize = 8;
+
 fn main() -> ExitCode {
     // clap ends the program with 2 on wrong usage and 0 on --help.
     let cli = Cli::parse();
@@ -66,6 +69,7 @@ fn run(command: Command) -> Result<()> {
             drop(progress);
             write_figures(&arguments.json, &figures)
         }
+        Command::Evaluate(Evaluate::Realism(arguments)) => run_evaluate_realism(&arguments),
         Command::Serve(arguments) => Ok(serve(&arguments.stream, arguments.listen)?),
     }
 }
@@ -180,6 +184,18 @@ fn pixels(distance_px: Option<f64>) -> String {
 }
 
 /// Writes figures to a file and to standard output.
+fn run_evaluate_realism(arguments: &cli::EvaluateRealism) -> Result<()> {
+    use evaluate::realism;
+    let progress = Progress::new("realism", 0);
+    if let (Some(out), Some(annotated)) = (&arguments.sheet, &arguments.annotated) {
+        let sheet = realism::sheet(annotated, SHEET_ROWS, arguments.seed, &progress)?;
+        sheet.save(out).with_context(|| format!("cannot write {}", out.display()))?;
+    }
+    let figures = realism::evaluate(&arguments.real, &arguments.ours, &progress)?;
+    drop(progress);
+    write_figures(&arguments.json, &figures)
+}
+
 fn write_figures(path: &Path, figures: &impl Serialize) -> Result<()> {
     write_json(path, figures)?;
     println!("{}", serde_json::to_string_pretty(figures)?);

@@ -6,7 +6,10 @@ use std::f32::consts::{PI, TAU};
 use glam::Quat;
 use rand::Rng;
 
-use crate::motion::{Clip, Joint, Motions, Pose};
+use crate::{
+    dataset::Split,
+    motion::{Clip, Joint, Motions, Pose},
+};
 
 fn limb(flex: f32, out: f32, twist: f32, left: bool) -> Quat {
     let side = if left { 1.0 } else { -1.0 };
@@ -282,9 +285,22 @@ const HELD_OUT: [&str; 8] = [
     "made-backpedal",
 ];
 
-/// Everything a player of the training (`held_out` false) or test split may do.
+/// Actions that only validation shows.
+const VALIDATION: [&str; 4] = ["jump", "spin", "made-fast-run", "made-slide"];
+
+fn split_of(name: &str) -> Split {
+    if HELD_OUT.contains(&name) {
+        Split::Test
+    } else if VALIDATION.contains(&name) {
+        Split::Validation
+    } else {
+        Split::Train
+    }
+}
+
+/// Everything a player of a split may do.
 #[must_use]
-pub fn repertoire(motions: &Motions, held_out: bool) -> Vec<Action<'_>> {
+pub fn repertoire(motions: &Motions, split: Split) -> Vec<Action<'_>> {
     let clips = motions.clips().iter().map(|clip| {
         let weight = match clip.name.as_str() {
             "run" => 10.0,
@@ -313,7 +329,7 @@ pub fn repertoire(motions: &Motions, held_out: bool) -> Vec<Action<'_>> {
         weight,
         source: Source::Made(make),
     });
-    clips.chain(made).filter(|action| HELD_OUT.contains(&action.name.as_str()) == held_out).collect()
+    clips.chain(made).filter(|action| split_of(&action.name) == split).collect()
 }
 
 /// Draws an action by weight.

@@ -38,6 +38,7 @@ pub mod stadium;
 mod stands;
 pub mod trajectories;
 pub mod truth;
+pub mod view;
 pub mod wardrobe;
 
 pub use clip::{Options, Synthesized, synthesize};

@@ -45,7 +45,7 @@ enum Command {
     Bench,
     /// Make a data set under target/datasets
     Dataset {
-        /// Which: depth-train or depth-test
+        /// Which one
         name: dataset::Name,
         /// Samples to render; the default is the number the shipped figures were measured on
         #[arg(long)]

@@ -6,4 +6,5 @@ pub mod depth;
 pub mod matches;
 pub mod npy;
 pub mod planes;
+pub mod realism;
 mod surface;

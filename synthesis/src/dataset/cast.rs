@@ -27,11 +27,9 @@ impl Cast {
             .into_par_iter()
             .map(|k| {
                 let mut rng = rng(options.seed, &[7, shard as u64, k as u64]);
-                // One body in four and one kit in four belong to the test split.
-                let held_out = |id: u32| (id % 4 == 3) == (options.split == Split::Test);
                 let mut pick = |count: u32| loop {
                     let id = rng.random_range(0..count);
-                    if held_out(id) {
+                    if split_of(id) == options.split {
                         break id;
                     }
                 };
@@ -51,6 +49,15 @@ impl Cast {
             })
             .collect();
         Self { figures, stadiums }
+    }
+}
+
+/// One body in four and one kit in four belong to the test split, one in eight to validation.
+fn split_of(id: u32) -> Split {
+    match id % 8 {
+        3 | 7 => Split::Test,
+        6 => Split::Validation,
+        _ => Split::Train,
     }
 }
 

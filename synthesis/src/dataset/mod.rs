@@ -10,9 +10,11 @@ use rayon::prelude::*;
 use crate::{SynthesisError, body::BaseBody, gait, motion::Motions, npy, truth::put};
 
 mod cast;
+mod frames;
 mod sample;
 
 use cast::Cast;
+pub use frames::{FrameOptions, broadcast_frames};
 pub use sample::{Sample, SampleMeta, aim, plane_depth};
 
 /// Side of a crop and of its mask, pixels.
@@ -27,7 +29,9 @@ pub const NO_OFFSET: i16 = i16::MIN;
 pub enum Split {
     /// For training.
     Train,
-    /// Actions, bodies and kits that training never sees.
+    /// To choose among what was trained.
+    Validation,
+    /// Never trained on, never chosen by.
     Test,
 }
 
@@ -64,7 +68,7 @@ pub fn depth_crops(options: &DepthOptions, progress: impl Fn(usize) + Sync) -> R
         Some(path) => Motions::open(path)?,
         None => Motions::shipped()?,
     };
-    let actions = gait::repertoire(&motions, options.split == Split::Test);
+    let actions = gait::repertoire(&motions, options.split);
     for (shard, first) in (0..options.count).step_by(options.shard).enumerate() {
         let folder = options.out.join(format!("shard-{shard:04}"));
         let last = (first + options.shard).min(options.count);
@@ -149,12 +153,12 @@ mod tests {
                 .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()[key].to_string())
                 .collect()
         };
+        let (_, validation) = write("d", Split::Validation);
         for key in ["body", "kit", "motion"] {
-            let held_out = names(&test, key);
-            assert!(
-                names(&train, key).iter().all(|name| !held_out.contains(name)),
-                "{key} is in both splits"
-            );
+            for (a, b) in [(&train, &test), (&train, &validation), (&validation, &test)] {
+                let held_out = names(b, key);
+                assert!(names(a, key).iter().all(|name| !held_out.contains(name)), "{key} is in two parts");
+            }
         }
     }
 }

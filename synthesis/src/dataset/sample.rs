@@ -277,7 +277,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let options = super::super::tests::options(folder.path(), Split::Train);
         let motions = Motions::shipped().unwrap();
-        let actions = gait::repertoire(&motions, false);
+        let actions = gait::repertoire(&motions, Split::Train);
         let cast = Cast::new(&base, &options, 0, 4);
         for index in 0..4 {
             let made = draw(&options, index, &cast, &actions).unwrap();

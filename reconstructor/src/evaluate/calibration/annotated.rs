@@ -8,8 +8,8 @@ use std::{
 };
 
 use glam::{DVec2, DVec3};
-use image::ImageReader;
-use protocol::pitch::Pitch;
+use image::{ImageReader, RgbImage};
+use protocol::{camera::Camera, pitch::Pitch};
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -33,12 +33,7 @@ pub(super) fn evaluate(
     progress: &Progress,
 ) -> Result<CalibrationFigures, CalibrationEvaluationError> {
     let names: BTreeMap<usize, NamedPoint> = parse(&data.join("pitch_points.json"))?;
-    let folder = data.join("labels");
-    let unreadable =
-        |path: &Path, reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
-    let entries = std::fs::read_dir(&folder).map_err(|e| unreadable(&folder, e.to_string()))?;
-    let mut labels: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    labels.sort();
+    let labels = label_files(data)?;
     let frames: Vec<Option<FrameErrors>> = labels
         .par_iter()
         .map(|label| {
@@ -50,20 +45,49 @@ pub(super) fn evaluate(
     Ok(summary(&frames.into_iter().flatten().collect::<Vec<_>>()))
 }
 
+/// A picture with the camera that its annotated points and its lines give.
+#[derive(Clone, Debug)]
+pub struct AnnotatedView {
+    /// The picture.
+    pub picture: RgbImage,
+    /// Its camera.
+    pub camera: Camera,
+}
+
+/// Every annotated picture that has a camera, in the order of names.
+///
+/// # Errors
+/// When a file cannot be read or is not of the form.
+pub fn annotated_views(
+    data: &Path,
+    progress: &Progress,
+) -> Result<Vec<AnnotatedView>, CalibrationEvaluationError> {
+    let names: BTreeMap<usize, NamedPoint> = parse(&data.join("pitch_points.json"))?;
+    let views: Vec<Option<AnnotatedView>> = label_files(data)?
+        .par_iter()
+        .map(|label| {
+            let (picture, points) = annotated(data, label, &names)?;
+            progress.advance(1);
+            if points.len() < LEAST_POINTS {
+                return Ok(None);
+            }
+            let calibration = Calibration { frame: 0, pitch: Pitch::default(), points };
+            let estimate = calibrate_pictures(vec![picture.clone()], &calibration)
+                .ok()
+                .and_then(|estimates| estimates.into_iter().next());
+            Ok(estimate.and_then(|e| e.camera).map(|camera| AnnotatedView { picture, camera }))
+        })
+        .collect::<Result<_, CalibrationEvaluationError>>()?;
+    Ok(views.into_iter().flatten().collect())
+}
+
 /// Errors of one annotated picture; `None` when it has too few points to count.
 fn annotated_picture(
     data: &Path,
     label: &Path,
     names: &BTreeMap<usize, NamedPoint>,
 ) -> Result<Option<FrameErrors>, CalibrationEvaluationError> {
-    let stem = label.file_stem().unwrap_or_default();
-    let path = data.join("images").join(stem).with_extension("jpg");
-    let unreadable =
-        |path: &Path, reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
-    let reader = ImageReader::open(&path).map_err(|e| unreadable(&path, e.to_string()))?;
-    let picture = reader.decode().map_err(|e| unreadable(&path, e.to_string()))?.into_rgb8();
-    let text = read(label)?;
-    let points = label_points(&text, names, picture.dimensions());
+    let (picture, points) = annotated(data, label, names)?;
     if points.len() < LEAST_POINTS {
         return Ok(None);
     }
@@ -72,7 +96,7 @@ fn annotated_picture(
     let estimate = match calibrate_pictures(vec![picture], &calibration) {
         Ok(estimates) => estimates.into_iter().next().unwrap_or_default(),
         Err(error) => {
-            tracing::info!(picture = %path.display(), %error, "no camera");
+            tracing::info!(label = %label.display(), %error, "no camera");
             return Ok(Some(FrameErrors::default()));
         }
     };
@@ -84,6 +108,31 @@ fn annotated_picture(
         iou: None,
         line_residual_px: estimate.line_residual_median_px,
     }))
+}
+
+/// The label files, in the order of names.
+fn label_files(data: &Path) -> Result<Vec<PathBuf>, CalibrationEvaluationError> {
+    let folder = data.join("labels");
+    let entries = std::fs::read_dir(&folder)
+        .map_err(|error| CalibrationEvaluationError::File { path: folder, reason: error.to_string() })?;
+    let mut labels: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    labels.sort();
+    Ok(labels)
+}
+
+/// The picture of a label and its points.
+fn annotated(
+    data: &Path,
+    label: &Path,
+    names: &BTreeMap<usize, NamedPoint>,
+) -> Result<(RgbImage, Vec<Correspondence>), CalibrationEvaluationError> {
+    let stem = label.file_stem().unwrap_or_default();
+    let path = data.join("images").join(stem).with_extension("jpg");
+    let unreadable = |reason: String| CalibrationEvaluationError::File { path: path.clone(), reason };
+    let reader = ImageReader::open(&path).map_err(|e| unreadable(e.to_string()))?;
+    let picture = reader.decode().map_err(|e| unreadable(e.to_string()))?.into_rgb8();
+    let points = label_points(&read(label)?, names, picture.dimensions());
+    Ok((picture, points))
 }
 
 /// The annotated points of one YOLO pose label: five numbers of the box, then x, y (shares of the picture) and visibility each.
@@ -143,8 +192,6 @@ fn least_triangle_px2(p: [DVec2; 4]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use protocol::camera::Camera;
-
     use super::{super::pitch_points, *};
 
     #[test]

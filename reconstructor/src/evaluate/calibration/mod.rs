@@ -21,6 +21,8 @@ use protocol::{
 };
 use serde::{Deserialize, Serialize};
 
+pub use annotated::{AnnotatedView, annotated_views};
+
 use crate::{
     calibration::{Calibration, CalibrationError, calibrate},
     ingest::Clip,
