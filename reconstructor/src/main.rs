@@ -198,8 +198,11 @@ fn run_evaluate_realism(arguments: &cli::EvaluateRealism) -> Result<()> {
 
 fn write_figures(path: &Path, figures: &impl Serialize) -> Result<()> {
     write_json(path, figures)?;
-    println!("{}", serde_json::to_string_pretty(figures)?);
-    Ok(())
+    // Whoever reads may stop early (`… | head`): that is no failure.
+    match writeln!(std::io::stdout().lock(), "{}", serde_json::to_string_pretty(figures)?) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
 }
 
 /// Writes a JSON file whole or not at all.

@@ -1,6 +1,9 @@
 //! `player inspect`: what a stream holds, how large its parts are, and whether every file is what the manifest says.
 
-use std::path::PathBuf;
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+};
 
 use anyhow::Context;
 use protocol::chunk;
@@ -99,41 +102,53 @@ pub(super) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
     figures.people_per_frame_mean = ratio(figures.body_frames, figures.frames as f64);
     figures.bytes_per_body_frame = ratio(figures.chunk_bytes, figures.body_frames as f64);
     figures.megabits_per_second = ratio(figures.chunk_bytes * 8, figures.duration_s * 1e6);
-    print(&figures);
+    // Whoever reads may stop early (`player inspect S | head`): that is no failure.
+    match print(&figures, &mut io::stdout().lock()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => return Err(error.into()),
+        _ => {}
+    }
     if let Some(path) = &arguments.json {
         super::write_json(path, &figures)?;
     }
     Ok(())
 }
 
-fn print(figures: &Figures) {
+fn print(figures: &Figures, out: &mut impl Write) -> io::Result<()> {
     let share = |bytes: usize| 100.0 * bytes as f64 / figures.chunk_bytes.max(1) as f64;
-    println!("{}", figures.stream);
-    println!("  pitch      {} × {} m", figures.pitch_length_m, figures.pitch_width_m);
+    writeln!(out, "{}", figures.stream)?;
+    writeln!(out, "  pitch      {} × {} m", figures.pitch_length_m, figures.pitch_width_m)?;
     let clip = figures.first_clip_frame.zip(figures.last_clip_frame);
     let clip = clip.map_or(String::new(), |(first, last)| format!(", clip frames {first} to {last}"));
-    println!(
+    writeln!(
+        out,
         "  length     {:.2} s, {} frames in {} chunks{clip}",
         figures.duration_s, figures.frames, figures.chunks
-    );
-    println!(
+    )?;
+    writeln!(
+        out,
         "  people     {}, {:.1} per frame with a mesh, {} triangles each on average",
         figures.people,
         figures.people_per_frame_mean,
         figures.triangles / figures.body_frames.max(1)
-    );
-    println!(
+    )?;
+    writeln!(
+        out,
         "  camera     in {} of {} frames; ball in {}",
         figures.frames_with_camera, figures.frames, figures.frames_with_ball
-    );
-    println!(
+    )?;
+    writeln!(
+        out,
         "  bytes      {} in chunks: {:.0} % geometry, {:.0} % texture, {:.0} % index; {:.0} per person and frame",
         figures.chunk_bytes,
         share(figures.geometry_bytes),
         share(figures.texture_bytes),
         share(figures.index_bytes),
         figures.bytes_per_body_frame
-    );
-    println!("  rate       {:.2} Mbit/s ({})", figures.megabits_per_second, figures.representation);
-    println!("  hashes     {} of {} chunks as the manifest says", figures.hashes_verified, figures.chunks);
+    )?;
+    writeln!(out, "  rate       {:.2} Mbit/s ({})", figures.megabits_per_second, figures.representation)?;
+    writeln!(
+        out,
+        "  hashes     {} of {} chunks as the manifest says",
+        figures.hashes_verified, figures.chunks
+    )
 }
