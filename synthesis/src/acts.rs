@@ -236,7 +236,7 @@ fn shot() -> Act {
 
 fn header() -> Act {
     let limb = |thigh: f32, knee: f32, ankle: f32, arm: f32, out: f32| {
-        side([thigh, 0.08, 0.05], knee, ankle, [arm, out, 0.1], 0.95)
+        side([thigh, 0.08, 0.05], knee, ankle, [arm, out, 0.1], 1.35)
     };
     let both = |l: Side, r: Side, lean: f32, nod: f32| {
         let mut pose = assemble(l, r, lean, 0.0, 0.0);
@@ -245,12 +245,12 @@ fn header() -> Act {
     };
     let stand = limb(0.15, 0.3, -0.1, 0.0, 0.25);
     let load = limb(0.55, 1.0, -0.45, -0.6, 0.35);
-    let rise = limb(-0.05, 0.25, 0.55, 0.9, 0.55);
+    let rise = limb(-0.05, 0.25, 0.55, 0.6, 0.75);
     let keys = vec![
         key(-0.75, both(stand, stand, 0.08, -0.15)),
         key(-0.48, both(load, load, 0.38, -0.45)),
-        key(-0.26, both(rise, limb(0.2, 0.6, 0.5, 1.0, 0.6), -0.05, -0.25)),
-        key(-0.10, both(limb(-0.25, 0.7, 0.5, 0.75, 0.9), limb(-0.15, 0.9, 0.5, 0.7, 0.9), -0.34, -0.2)),
+        key(-0.26, both(rise, limb(0.2, 0.6, 0.5, 0.65, 0.75), -0.05, -0.25)),
+        key(-0.10, both(limb(-0.25, 0.7, 0.5, 0.4, 1.0), limb(-0.15, 0.9, 0.5, 0.4, 1.0), -0.34, -0.2)),
         key(0.0, both(limb(0.05, 0.5, 0.5, 0.3, 0.85), limb(0.15, 0.7, 0.5, 0.3, 0.85), 0.18, 0.22)),
         key(0.12, both(limb(0.25, 0.35, 0.35, 0.1, 0.8), limb(0.3, 0.4, 0.35, 0.1, 0.8), 0.42, 0.28)),
         key(0.30, both(limb(0.2, 0.35, 0.1, 0.2, 0.6), limb(0.2, 0.3, 0.1, 0.2, 0.6), 0.3, -0.1)),
@@ -287,14 +287,14 @@ fn throw_in() -> Act {
 
 fn tackle() -> Act {
     let lead = |flex: f32, knee: f32| side([flex, 0.08, 0.0], knee, 0.15, [0.25, 0.9, 0.0], 0.5);
-    let tuck = |flex: f32, knee: f32, arm: f32| side([flex, 0.0, 0.55], knee, 0.5, [arm, 0.55, 0.0], 0.35);
+    let tuck = |flex: f32, knee: f32, arm: f32| side([flex, 0.0, 0.55], knee, 0.5, [arm, 0.55, 0.0], 0.9);
     let keys = vec![
         key(-0.50, assemble(tuck(0.5, 1.0, -0.3), lead(0.5, 0.9), 0.15, 0.0, 0.0)),
         key(-0.26, lying(assemble(tuck(0.85, 1.8, -0.7), lead(0.9, 0.9), 0.0, 0.0, 0.0), -0.35, 0.22, 0.0)),
         key(
             -0.08,
             looking(
-                lying(assemble(tuck(0.80, 2.2, -0.9), lead(0.75, 0.35), 0.3, 0.0, 0.0), -1.0, 0.42, 0.1),
+                lying(assemble(tuck(0.80, 2.2, -0.9), lead(0.55, 0.35), 0.3, 0.0, 0.0), -1.0, 0.42, 0.1),
                 -0.5,
                 0.0,
             ),
@@ -302,7 +302,7 @@ fn tackle() -> Act {
         key(
             0.10,
             looking(
-                lying(assemble(tuck(0.70, 2.3, -0.9), lead(0.62, 0.08), 0.4, 0.0, 0.0), -1.12, 0.50, 0.1),
+                lying(assemble(tuck(0.70, 2.3, -0.9), lead(0.40, 0.08), 0.4, 0.0, 0.0), -1.12, 0.50, 0.1),
                 -0.6,
                 0.0,
             ),
@@ -310,7 +310,7 @@ fn tackle() -> Act {
         key(
             0.55,
             looking(
-                lying(assemble(tuck(0.75, 2.2, -0.8), lead(0.65, 0.2), 0.45, 0.0, 0.0), -1.0, 0.45, 0.1),
+                lying(assemble(tuck(0.75, 2.2, -0.8), lead(0.45, 0.2), 0.45, 0.0, 0.0), -1.0, 0.45, 0.1),
                 -0.5,
                 0.0,
             ),

@@ -1,5 +1,6 @@
 //! Who plays: two teams, their goalkeepers and the officials of one match, each with a body, clothes and a movement.
 
+use protocol::pitch::Pitch;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -9,8 +10,9 @@ use crate::{
     body::{BaseBody, Build},
     figure::{Detail, Figure, dress},
     motion::Motions,
-    movement::{Habits, Movement, kicks},
+    movement::{Habits, Movement},
     outfit::{Outfit, Sleeves},
+    play::{self, Event},
     trajectories::{Path2, Role, Trajectories},
     wardrobe::Wardrobe,
 };
@@ -35,14 +37,14 @@ pub struct Cast {
 
 impl Cast {
     /// Dresses and moves everybody of `paths`, which are already at `rate_hz`; everything random follows from `seed`.
-    pub fn new(paths: &Trajectories, rate_hz: f32, seed: u64) -> Result<Self, SynthesisError> {
+    pub fn new(paths: &Trajectories, rate_hz: f32, pitch: &Pitch, seed: u64) -> Result<Self, SynthesisError> {
         let base = BaseBody::load()?;
         let motions = Motions::shipped()?;
         let rng = &mut generator(seed, u64::MAX);
         let wardrobe = Wardrobe::draw(rng);
         // Now and then women play; teams are not mixed.
         let women = rng.random_bool(0.25);
-        let strikes = kicks(&paths.people, &paths.ball, rate_hz);
+        let events = play::events(&paths.people, &paths.ball, rate_hz, pitch);
         let member = |(index, path): (usize, &Path2)| {
             let rng = &mut generator(seed, index as u64);
             let kit = wardrobe.kit(path.team, path.role).clone();
@@ -60,9 +62,9 @@ impl Cast {
                 phase: rng.random_range(0.0..1.0),
                 size: build.height_m / 1.8,
             };
-            let own: Vec<usize> =
-                strikes.iter().filter(|(who, _)| *who == index).map(|&(_, frame)| frame).collect();
-            let movement = Movement::along(path, &paths.ball, rate_hz, &motions, habits, &own)?;
+            let own: Vec<Event> =
+                events.iter().filter(|(who, _)| *who == index).map(|&(_, event)| event).collect();
+            let movement = Movement::along(path, &paths.ball, rate_hz, &motions, habits, &own, &figure)?;
             Ok(Member { path: path.clone(), figure, movement })
         };
         let members =

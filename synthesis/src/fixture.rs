@@ -75,7 +75,7 @@ impl Fixture {
         let rng = &mut Pcg64Mcg::seed_from_u64(options.seed);
         let mut stadium = Stadium::new(Pitch::default(), boards(), Lights::floodlights(), rng.random());
         let rate = options.rate_hz as f32;
-        let Cast { members, wardrobe } = Cast::new(&paths, rate, options.seed)?;
+        let Cast { members, wardrobe } = Cast::new(&paths, rate, &stadium.pitch, options.seed)?;
         let colours = wardrobe.teams.each_ref().map(|kit| kit.shirt);
         stadium.crowd = vec![[0.90, 0.90, 0.92], colours[0], colours[1], [0.10, 0.11, 0.16]];
         let cameras = follow(&options.tripod, options.size_px, &paths.ball, &paths.people, rate);
@@ -102,8 +102,9 @@ impl Fixture {
             .members
             .iter()
             .map(|member| {
-                let (placement, pose) = &member.movement.frames[frame];
-                Actor { figure: &member.figure, posed: rig::pose(&member.figure, pose).placed(placement) }
+                let step = &member.movement.steps[frame];
+                let posed = rig::pose_at(&member.figure, &step.pose, step.hips_m).placed(&step.placement);
+                Actor { figure: &member.figure, posed }
             })
             .collect();
         // The ball rolls as far as it moves.
@@ -126,6 +127,6 @@ impl Fixture {
     /// The anchor of a member at a frame, world metres.
     #[must_use]
     pub fn anchor_m(&self, member: usize, frame: usize) -> Vec3 {
-        self.members[member].movement.frames[frame].0.anchor_m
+        self.members[member].movement.steps[frame].placement.anchor_m
     }
 }

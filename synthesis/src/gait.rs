@@ -7,6 +7,7 @@ use glam::Quat;
 use rand::Rng;
 
 use crate::{
+    acts::{self, Kind},
     dataset::Split,
     motion::{Clip, Joint, Motions, Pose},
 };
@@ -110,6 +111,18 @@ pub const BACKPEDAL: Stride = Stride {
     flight_m: 0.0,
 };
 
+/// Going sideways, low, feet apart.
+pub const SHUFFLE: Stride = Stride {
+    reach: 0.05,
+    lift: 0.42,
+    fold: 0.42,
+    bend: 0.95,
+    pump: 0.12,
+    elbow: 1.0,
+    lean: 0.24,
+    flight_m: 0.0,
+};
+
 /// A gait at a share 0..1 of its cycle; at 0 the left foot is furthest ahead.
 #[must_use]
 pub fn stride(shape: &Stride, phase: f32) -> Pose {
@@ -197,52 +210,6 @@ pub fn stand(mood: f32, phase: f32) -> Pose {
     assemble(left, right, 0.03, 0.02 * sway, 0.06 * sway)
 }
 
-/// A throw-in or a jump with both arms up: 0 behind the head, 1 released.
-#[must_use]
-pub fn overhead(phase: f32) -> Pose {
-    let arm = Side {
-        thigh: [0.1, 0.08, 0.1],
-        knee: 0.2,
-        ankle: -0.1,
-        arm: [2.95 - 1.2 * phase, 0.18, 0.0],
-        elbow: 1.35 * (1.0 - phase) + 0.15,
-    };
-    let back = Side { thigh: [-0.35, 0.06, 0.1], knee: 0.35, ankle: 0.2, ..arm };
-    assemble(arm, back, 0.28 * phase - 0.22, 0.0, 0.0)
-}
-
-/// A header: 0 the take-off, 1 at the ball, in the air.
-#[must_use]
-pub fn header(phase: f32) -> Pose {
-    let side = |knee: f32| Side {
-        thigh: [-0.05 + 0.25 * knee, 0.1, 0.05],
-        knee: 0.5 + knee,
-        ankle: 0.5,
-        arm: [0.5, 0.75, 0.2],
-        elbow: 0.9,
-    };
-    let mut pose = assemble(side(0.2), side(0.7), 0.45 * phase - 0.25, 0.05, 0.15);
-    pose.clearance_m = 0.55 * (phase * PI).sin().max(0.0);
-    pose
-}
-
-/// A slide tackle on the right thigh: 0 going down, 1 stretched.
-#[must_use]
-pub fn slide(phase: f32) -> Pose {
-    let lead = Side {
-        thigh: [0.9 + 0.35 * phase, 0.1, 0.0],
-        knee: 0.5 - 0.4 * phase,
-        ankle: -0.1,
-        arm: [0.3, 0.9, 0.0],
-        elbow: 0.4,
-    };
-    let tucked = Side { thigh: [0.9, 0.3, 0.5], knee: 1.9, ankle: 0.5, arm: [-0.7, 0.6, 0.0], elbow: 0.3 };
-    let mut pose = assemble(lead, tucked, 0.1, -0.1, 0.1);
-    *pose.joint(Joint::Pelvis) = Quat::from_rotation_x(-0.9 * phase - 0.2) * Quat::from_rotation_z(-0.25);
-    *pose.joint(Joint::Chest) = Quat::from_rotation_x(0.45 * phase) * Quat::from_rotation_z(0.15);
-    pose
-}
-
 /// One thing a training player may do.
 #[derive(Clone, Debug)]
 pub struct Action<'a> {
@@ -281,7 +248,7 @@ const HELD_OUT: [&str; 8] = [
     "0walk_forward",
     "dance_b",
     "made-sprint",
-    "made-overhead",
+    "made-throw-in",
     "made-backpedal",
 ];
 
@@ -311,7 +278,7 @@ pub fn repertoire(motions: &Motions, split: Split) -> Vec<Action<'_>> {
         };
         Action { name: clip.name.clone(), weight, source: Source::Clip(clip) }
     });
-    let made: [(&str, f32, Formula); 9] = [
+    let made: [(&str, f32, Formula); 13] = [
         ("made-jog", 9.0, |phase, mood| stride(&JOG, phase).blend(&stand(0.9, 0.0), 0.35 * mood)),
         ("made-fast-run", 6.0, |phase, mood| {
             stride(&JOG, phase).blend(&stride(&SPRINT, phase), 0.3 + 0.5 * mood)
@@ -320,9 +287,13 @@ pub fn repertoire(motions: &Motions, split: Split) -> Vec<Action<'_>> {
         ("made-backpedal", 3.0, |phase, _| stride(&BACKPEDAL, -phase)),
         ("made-sidestep", 5.0, |phase, _| sidestep(phase)),
         ("made-stand", 7.0, |phase, mood| stand(mood, phase)),
-        ("made-overhead", 1.5, |phase, _| overhead(phase)),
-        ("made-header", 2.0, |phase, _| header(phase)),
-        ("made-slide", 1.5, |phase, _| slide(phase)),
+        ("made-pass", 3.0, |phase, _| acts::drawn(Kind::Pass, phase)),
+        ("made-shot", 3.0, |phase, _| acts::drawn(Kind::Shot, phase)),
+        ("made-header", 2.0, |phase, _| acts::drawn(Kind::Header, phase)),
+        ("made-throw-in", 1.5, |phase, _| acts::drawn(Kind::ThrowIn, phase)),
+        ("made-tackle", 1.5, |phase, _| acts::drawn(Kind::Tackle, phase)),
+        ("made-dive", 1.5, |phase, _| acts::drawn(Kind::Dive, phase)),
+        ("made-fall", 1.0, |phase, _| acts::drawn(Kind::Fall, phase)),
     ];
     let made = made.into_iter().map(|(name, weight, make)| Action {
         name: name.into(),

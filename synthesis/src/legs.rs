@@ -114,6 +114,20 @@ impl Legs {
         Foot { ankle, turn }
     }
 
+    /// The turn of a shank in `pose`.
+    #[must_use]
+    pub fn shank(&self, pose: &Pose, side: usize) -> Quat {
+        let [pelvis, thigh, calf] =
+            [Joint::Pelvis, THIGHS[side], CALVES[side]].map(|joint| pose.rotations[joint as usize]);
+        pelvis * thigh * calf
+    }
+
+    /// The joint between shank and foot of one side.
+    #[must_use]
+    pub fn ankle_joint(side: usize) -> Joint {
+        FEET[side]
+    }
+
     /// Height of the lowest point of a sole, toes straight.
     #[must_use]
     pub fn sole_y(&self, foot: &Foot, side: usize) -> f32 {
@@ -133,7 +147,9 @@ impl Legs {
         let at = ankle.with_y(self.ankle_m());
         let pivot = if pitch > 0.0 { leg.heel } else { leg.ball };
         let turn = flat * Quat::from_rotation_x(-pitch);
-        Foot { ankle: at + flat * pivot - turn * pivot, turn }
+        // Skinning pulls the sole before the joint of the toes down with the foot: about a centimetre at 40°.
+        let eased = Vec3::Y * (-pitch).max(0.0) * 0.015;
+        Foot { ankle: at + flat * pivot - turn * pivot + eased, turn }
     }
 
     /// How high the middle of the hips may be at most for the leg to reach `ankle`; both in a frame whose origin is
@@ -161,9 +177,10 @@ impl Legs {
         let line = foot.ankle - hip;
         let distance = line.length().clamp(least, (a + b) * STRAIGHT);
         let along = line.normalize_or(Vec3::NEG_Y);
-        // Where the knee points: half as the pose has it, half as the foot looks.
+        // Where the knee points: as the pose has it, and half as the foot looks while that is ahead.
         let toes = foot.turn * Vec3::Z;
-        let wanted = (before * Vec3::Z).lerp(toes.with_y(0.0).normalize_or(before * Vec3::Z), 0.5);
+        let level = 0.5 * ((toes.dot(pelvis * Vec3::Z) - 0.4) / 0.4).clamp(0.0, 1.0);
+        let wanted = (before * Vec3::Z).lerp(toes.with_y(0.0).normalize_or(before * Vec3::Z), level);
         let ahead =
             (wanted - along * wanted.dot(along)).normalize_or((before * Vec3::Z).any_orthonormal_vector());
         let cosine = ((distance * distance + a * a - b * b) / (2.0 * distance * a)).clamp(-1.0, 1.0);
@@ -246,7 +263,7 @@ mod tests {
             let rolled = legs.planted(1, ankle, 1.0, pitch);
             let pivot = if pitch > 0.0 { legs.legs[1].heel } else { legs.legs[1].ball };
             let moved = (rolled.ankle + rolled.turn * pivot).distance(flat.ankle + flat.turn * pivot);
-            assert!(moved < 1e-4, "the pivot moved {moved} m");
+            assert!(moved < 0.01, "the pivot moved {moved} m");
             assert!((rolled.turn * Vec3::Z).y * pitch > 0.0, "positive lifts the toes");
         }
     }

@@ -60,11 +60,13 @@ pub struct Pose {
     pub rotations: [Quat; JOINTS],
     /// How high the lowest point of the body is above the ground, metres; 0 while a foot stands.
     pub clearance_m: f32,
+    /// How far the toes of the left and right foot bend up against the foot, radians.
+    pub toes: [f32; 2],
 }
 
 impl Default for Pose {
     fn default() -> Self {
-        Self { rotations: [Quat::IDENTITY; JOINTS], clearance_m: 0.0 }
+        Self { rotations: [Quat::IDENTITY; JOINTS], clearance_m: 0.0, toes: [0.0; 2] }
     }
 }
 
@@ -76,7 +78,12 @@ impl Pose {
         for (rotation, &end) in rotations.iter_mut().zip(&other.rotations) {
             *rotation = rotation.lerp(end, share);
         }
-        Self { rotations, clearance_m: self.clearance_m + (other.clearance_m - self.clearance_m) * share }
+        let mix = |a: f32, b: f32| a + (b - a) * share;
+        Self {
+            rotations,
+            clearance_m: mix(self.clearance_m, other.clearance_m),
+            toes: [0, 1].map(|side| mix(self.toes[side], other.toes[side])),
+        }
     }
 
     /// The same pose with left and right exchanged.
@@ -87,7 +94,7 @@ impl Pose {
             let q = self.rotations[other];
             rotations[joint] = Quat::from_xyzw(q.x, -q.y, -q.z, q.w);
         }
-        Self { rotations, clearance_m: self.clearance_m }
+        Self { rotations, clearance_m: self.clearance_m, toes: [self.toes[1], self.toes[0]] }
     }
 
     /// The rotation of a joint, to change.

@@ -6,7 +6,7 @@ use glam::{Mat3, Quat, Vec3};
 
 use crate::{
     body::{BONES, Bone, ShapedBody},
-    figure::Figure,
+    figure::{Figure, Vertex},
     motion::{JOINTS, Joint, PARENTS, Pose},
 };
 
@@ -77,6 +77,11 @@ impl Skeleton {
                 Some(end) => body.head(end) - body.heads[bone],
                 None => Vec3::NEG_Y,
             };
+            for (toes, bend) in [Bone::BallL, Bone::BallR].into_iter().zip(pose.toes) {
+                if bone == toes as usize {
+                    rotation *= Quat::from_rotation_x(-bend);
+                }
+            }
             let hang = Quat::from_rotation_arc(rest.normalize_or(Vec3::NEG_Y), Vec3::NEG_Y);
             rotations[bone] = Mat3::from_quat(rotation * hang);
         }
@@ -118,35 +123,94 @@ pub struct Posed {
     pub hips: Vec3,
 }
 
+/// Where the skeleton takes one vertex, and how it turns there.
+fn carried(skeleton: &Skeleton, vertex: &Vertex) -> (Mat3, Vec3) {
+    let (mut rotation, mut translation) = (Mat3::ZERO, Vec3::ZERO);
+    for (&bone, &weight) in vertex.bones.iter().zip(&vertex.weights) {
+        if weight > 0.0 {
+            rotation += skeleton.rotations[usize::from(bone)] * weight;
+            translation += skeleton.translations[usize::from(bone)] * weight;
+        }
+    }
+    (rotation, rotation * vertex.rest + translation)
+}
+
 /// Skins `figure` in `pose`, standing on the ground (or `pose.clearance_m` above it), in the person's frame.
 #[must_use]
 pub fn pose(figure: &Figure, pose: &Pose) -> Posed {
-    let mut skeleton = Skeleton::new(&figure.body, &figure.parents, pose);
+    let (skeleton, posed) = skinned(figure, pose);
+    let lowest = posed.positions.iter().map(|position| position.y).fold(f32::MAX, f32::min);
+    lifted(figure, skeleton, posed, pose.clearance_m - lowest)
+}
+
+/// Skins `figure` in `pose` with the middle of its hips `hips_m` above the ground, in the person's frame.
+#[must_use]
+pub fn pose_at(figure: &Figure, pose: &Pose, hips_m: f32) -> Posed {
+    let (skeleton, posed) = skinned(figure, pose);
+    lifted(figure, skeleton, posed, hips_m)
+}
+
+fn skinned(figure: &Figure, pose: &Pose) -> (Skeleton, Posed) {
+    let skeleton = Skeleton::new(&figure.body, &figure.parents, pose);
     let mut posed = Posed {
         positions: Vec::with_capacity(figure.vertices.len()),
         normals: Vec::with_capacity(figure.vertices.len()),
         ..Posed::default()
     };
-    let mut lowest = f32::MAX;
     for vertex in &figure.vertices {
-        let (mut rotation, mut translation) = (Mat3::ZERO, Vec3::ZERO);
-        for (&bone, &weight) in vertex.bones.iter().zip(&vertex.weights) {
-            if weight > 0.0 {
-                rotation += skeleton.rotations[usize::from(bone)] * weight;
-                translation += skeleton.translations[usize::from(bone)] * weight;
-            }
-        }
-        let position = rotation * vertex.rest + translation;
-        lowest = lowest.min(position.y);
+        let (rotation, position) = carried(&skeleton, vertex);
         posed.positions.push(position);
         posed.normals.push((rotation * vertex.normal).normalize_or(Vec3::Y));
     }
-    let lift = pose.clearance_m - lowest;
-    skeleton.lift(lift);
-    posed.positions.iter_mut().for_each(|position| position.y += lift);
-    posed.hips = Vec3::new(0.0, lift, 0.0);
+    (skeleton, posed)
+}
+
+fn lifted(figure: &Figure, mut skeleton: Skeleton, mut posed: Posed, height: f32) -> Posed {
+    skeleton.lift(height);
+    posed.positions.iter_mut().for_each(|position| position.y += height);
+    posed.hips = Vec3::new(0.0, height, 0.0);
     posed.landmarks = figure.landmarks.iter().map(|&(bone, rest)| skeleton.carry(bone, rest)).collect();
     posed
+}
+
+/// The few vertices of a figure that can touch the ground in any pose: the outermost of every bone.
+#[derive(Clone, Debug)]
+pub struct Probes {
+    vertices: Vec<Vertex>,
+}
+
+impl Probes {
+    /// The outermost vertices along the axes, diagonals and corners of each bone's share of the surface.
+    #[must_use]
+    pub fn of(figure: &Figure) -> Self {
+        let mut chosen = std::collections::BTreeSet::new();
+        let steps = [-1.0f32, 0.0, 1.0];
+        for bone in 0..BONES as u8 {
+            let own: Vec<usize> = (0..figure.vertices.len())
+                .filter(|&v| {
+                    let vertex = &figure.vertices[v];
+                    vertex.bones.iter().zip(&vertex.weights).any(|(&b, &weight)| b == bone && weight > 0.3)
+                })
+                .collect();
+            for x in steps {
+                for y in steps {
+                    for z in steps {
+                        let way = Vec3::new(x, y, z);
+                        let reach = |v: &usize| figure.vertices[*v].rest.dot(way);
+                        chosen.extend(own.iter().copied().max_by(|a, b| reach(a).total_cmp(&reach(b))));
+                    }
+                }
+            }
+        }
+        Self { vertices: chosen.into_iter().map(|v| figure.vertices[v]).collect() }
+    }
+
+    /// Height of the lowest point of `figure` in `pose`, measured from the middle of the hips.
+    #[must_use]
+    pub fn lowest_m(&self, figure: &Figure, pose: &Pose) -> f32 {
+        let skeleton = Skeleton::new(&figure.body, &figure.parents, pose);
+        self.vertices.iter().map(|vertex| carried(&skeleton, vertex).1.y).fold(f32::MAX, f32::min)
+    }
 }
 
 impl Posed {
