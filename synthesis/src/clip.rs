@@ -1,25 +1,25 @@
 //! The whole way: a rendered broadcast clip with its truth in a folder.
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-    process::{Child, Command, Stdio},
-};
+use std::path::PathBuf;
 
 use image::RgbImage;
+use protocol::pitch::Pitch;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use crate::{
     SynthesisError,
+    chain::Rate,
     correspondences::clicked,
     fixture::{Fixture, FixtureOptions},
-    operator::Tripod,
-    render::Window,
-    sensor::Sensor,
+    render::{Exposure, Window},
+    shots::{self, Shots, Take},
+    shutter::Shutter,
     trajectories::Trajectories,
     truth::{self, Reduced, TruthOptions, TruthWriter},
+    venue::Setting,
+    video::Video,
 };
 
 /// Frames per second of every rendered clip.
@@ -44,8 +44,12 @@ pub struct Options {
     pub truth_triangles: u32,
     /// Whether every frame's maps are written too: people, lines, first and last surfaces.
     pub maps: bool,
-    /// Quality of the H.264 file: x264's CRF, 0 (best) to 51.
-    pub crf: u8,
+    /// Quality of the H.264 file: x264's CRF, 0 (best) to 51; without, a broadcaster's bitrate drawn from the seed.
+    pub crf: Option<u8>,
+    /// How freely the place, the camera and its chain are chosen.
+    pub setting: Setting,
+    /// Which cameras are on air when.
+    pub shots: Shots,
 }
 
 impl Default for Options {
@@ -59,7 +63,9 @@ impl Default for Options {
             start_seconds: 0.0,
             truth_triangles: 1500,
             maps: false,
-            crf: 20,
+            crf: None,
+            setting: Setting::default(),
+            shots: Shots::default(),
         }
     }
 }
@@ -81,11 +87,28 @@ pub struct Synthesized {
 
 /// Renders a frame of a match: the picture that the broadcast shows.
 pub fn render_frame(fixture: &Fixture, frame: usize, seed: u64) -> Result<RgbImage, SynthesisError> {
-    let camera = fixture.cameras[frame];
-    let size = [camera.width_px as usize, camera.height_px as usize];
-    let light = fixture.scene(frame).render(&camera, Window { first: [0, 0], size }, 3);
-    let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ (frame as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    let mut picture = Sensor::clean().expose(&light, rng)?;
+    let shown = &fixture.film[frame];
+    let beside = shots::beside(frame, fixture.frames());
+    let (scene, other) = (fixture.scene(frame), fixture.scene(beside));
+    let open = fixture.chain.shutter * (beside as f32 - frame as f32);
+    let take = |take: &Take, number: u64| {
+        // Somebody may have put another camera in this one's place; that one stands still.
+        let camera = if number == 0 { fixture.cameras[frame] } else { take.camera };
+        let next = if camera == take.camera { take.next } else { camera };
+        let shutter = (open != 0.0).then_some(Shutter { other: &other, camera: &next, open });
+        let exposure = Exposure { side: fixture.chain.side, shutter, focus: take.focus };
+        let size = [camera.width_px as usize, camera.height_px as usize];
+        let light = scene.expose(&camera, Window { first: [0, 0], size }, &exposure);
+        let salt = (frame as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ number;
+        fixture.chain.sensor.expose(&light, &mut Pcg64Mcg::seed_from_u64(seed ^ salt))
+    };
+    let mut picture = take(&shown.main, 0)?;
+    if let Some(other) = &shown.other {
+        let (behind, share) = (take(other, 1)?, (other.share * 256.0) as u32);
+        for (a, b) in picture.iter_mut().zip(behind.iter()) {
+            *a = ((u32::from(*a) * (256 - share) + u32::from(*b) * share + 128) >> 8) as u8;
+        }
+    }
     fixture.score.draw(&mut picture, frame as f64 / f64::from(FRAME_RATE));
     Ok(picture)
 }
@@ -115,7 +138,9 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
             rate_hz: f64::from(FRAME_RATE),
             size_px: options.size_px,
             start_seconds: options.start_seconds,
-            tripod: Tripod::default(),
+            setting: options.setting,
+            pitch: options.trajectories.as_ref().map(|_| Pitch::default()),
+            shots: options.shots.clone(),
         },
     )?;
     std::fs::create_dir_all(&options.out).map_err(|source| SynthesisError::Io {
@@ -133,7 +158,8 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
     let palette = truth::palette(&fixture.members)?;
 
     let clip = options.out.join("clip.mp4");
-    let mut video = Video::start(&clip, options)?;
+    let rate = options.crf.map_or(fixture.chain.rate, Rate::Quality);
+    let mut video = Video::start(&clip, options.size_px, FRAME_RATE, rate)?;
     let mut writer = TruthWriter::create(
         &options.out,
         TruthOptions {
@@ -181,72 +207,11 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
     })
 }
 
-/// An H.264 file being written by the `ffmpeg` program.
-struct Video {
-    path: PathBuf,
-    process: Child,
-}
-
-impl Video {
-    fn start(path: &Path, options: &Options) -> Result<Self, SynthesisError> {
-        let (width, height) = options.size_px;
-        let process = Command::new("ffmpeg")
-            .args(["-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
-            .args(["-s", &format!("{width}x{height}"), "-r", &FRAME_RATE.to_string(), "-i", "-"])
-            .args(["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"])
-            .args([
-                "-c:v",
-                "libx264",
-                "-preset",
-                "slow",
-                "-crf",
-                &options.crf.to_string(),
-                "-g",
-                "50",
-                "-threads",
-                "1",
-            ])
-            .args(["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"])
-            .args([
-                "-color_range",
-                "tv",
-                "-fflags",
-                "+bitexact",
-                "-flags:v",
-                "+bitexact",
-                "-movflags",
-                "+faststart",
-            ])
-            .arg(path)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::inherit())
-            .spawn()
-            .map_err(SynthesisError::Encoder)?;
-        Ok(Self { path: path.to_owned(), process })
-    }
-
-    fn push(&mut self, picture: &RgbImage) -> Result<(), SynthesisError> {
-        let stopped = || std::io::Error::new(std::io::ErrorKind::BrokenPipe, "it takes no pictures");
-        let pipe = self.process.stdin.as_mut().ok_or_else(stopped).map_err(SynthesisError::Encoder)?;
-        pipe.write_all(picture.as_raw()).map_err(SynthesisError::Encoder)
-    }
-
-    fn finish(mut self) -> Result<(), SynthesisError> {
-        drop(self.process.stdin.take());
-        let status = self.process.wait().map_err(SynthesisError::Encoder)?;
-        if !status.success() {
-            let message = format!("ffmpeg left with {status} while writing {}", self.path.display());
-            return Err(SynthesisError::Options(message));
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use protocol::{chunk, limits::Limits, manifest::Manifest};
+    use std::process::{Command, Stdio};
 
     fn small(seed: u64) -> Fixture {
         let options = FixtureOptions {
@@ -255,7 +220,7 @@ mod tests {
             rate_hz: 25.0,
             size_px: (320, 180),
             start_seconds: 0.5,
-            tripod: Tripod::default(),
+            ..FixtureOptions::default()
         };
         Fixture::new(&Trajectories::generated(seed, 2.0), &options).unwrap()
     }
@@ -266,6 +231,40 @@ mod tests {
         let first = picture(5);
         assert_eq!(first, picture(5));
         assert_ne!(first, picture(6));
+    }
+
+    #[test]
+    fn shots_cut_and_dissolve_the_same_way_every_time_and_the_truth_says_so() {
+        let film = || {
+            let options = FixtureOptions {
+                seed: 8,
+                frames: 9,
+                size_px: (256, 144),
+                shots: "main:3,close-up:3~2,high-behind".parse().unwrap(),
+                ..FixtureOptions::default()
+            };
+            Fixture::new(&Trajectories::generated(8, 2.0), &options).unwrap()
+        };
+        let (fixture, again) = (film(), film());
+        let picture = |frame: usize| render_frame(&fixture, frame, 8).unwrap();
+        for frame in [2, 3, 8] {
+            assert_eq!(picture(frame), render_frame(&again, frame, 8).unwrap(), "frame {frame}");
+        }
+        let shots: Vec<_> = fixture.film.iter().map(|frame| frame.truth()).collect();
+        let numbers: Vec<usize> = shots.iter().map(|shot| shot.shot).collect();
+        assert_eq!(numbers, [0, 0, 0, 0, 1, 1, 2, 2, 2]);
+        assert!(
+            shots[3].main_camera && shots[3].mixed_with.is_some_and(|(shot, share)| shot == 1 && share < 0.5)
+        );
+        assert!(!shots[5].main_camera && shots[5].mixed_with.is_none());
+        // Half-way through the dissolve the picture is a mixture of what it was and what it becomes.
+        let mean =
+            |frame: usize| picture(frame).iter().map(|b| f64::from(*b)).sum::<f64>() / (256.0 * 144.0 * 3.0);
+        let (before, between, after) = (mean(2), mean(4), mean(5));
+        assert!(before.min(after) - 3.0 < between && between < before.max(after) + 3.0);
+        // The camera in the truth is the one whose picture dominates.
+        assert!(fixture.cameras[5].focal_px > 1.5 * fixture.cameras[2].focal_px, "a close-up is close");
+        assert!(fixture.cameras[8].position.x.abs() > 50.0, "high behind a goal");
     }
 
     #[test]

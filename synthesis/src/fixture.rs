@@ -1,21 +1,29 @@
 //! A whole match ready to be filmed: stadium, two teams, officials, ball, camera, all from one seed.
 
-use glam::{Quat, Vec3};
+use std::borrow::Cow;
+
+use glam::{Quat, Vec2, Vec3};
 use protocol::{camera::Camera, pitch::Pitch};
+
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::{
     SynthesisError,
+    bystanders::{self, Bystander},
     cast::Cast,
-    operator::{Tripod, follow},
+    chain::Chain,
+    furniture,
+    nets::NetLook,
+    operator::{Play, Tripod},
     overlay::ScoreBoard,
-    paint::Lights,
     props,
-    render::{Actor, Scene, Solid},
+    render::{Actor, Focus, Scene, Solid},
     rig,
-    stadium::{Board, Stadium},
+    shots::{Frame, ShotKind, Shots},
+    stadium::Stadium,
     trajectories::Trajectories,
+    venue::{self, Setting, Venue},
 };
 
 pub use crate::cast::Member;
@@ -26,17 +34,24 @@ pub struct Fixture {
     pub stadium: Stadium,
     /// Everybody; the index is the identity in the truth.
     pub members: Vec<Member>,
-    /// The camera of each frame.
+    /// The camera of each frame; of the picture that dominates when two are mixed.
     pub cameras: Vec<Camera>,
+    /// Which shots each frame shows.
+    pub film: Vec<Frame>,
+    /// Shutter, lens, sensor and encoder.
+    pub chain: Chain,
+    /// People beside the pitch who take no part.
+    pub bystanders: Vec<Bystander>,
     /// Middle of the ball in each frame.
     pub ball: Vec<Vec3>,
     /// The score graphic.
     pub score: ScoreBoard,
-    goals: Solid,
+    net: NetLook,
+    things: Vec<Solid>,
 }
 
 /// What a match is made from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct FixtureOptions {
     /// Looks of people and stadium.
     pub seed: u64,
@@ -48,20 +63,32 @@ pub struct FixtureOptions {
     pub size_px: (u32, u32),
     /// Where in the recording the clip starts.
     pub start_seconds: f64,
-    /// The camera's place and framing.
-    pub tripod: Tripod,
+    /// How freely place and camera are chosen.
+    pub setting: Setting,
+    /// The pitch that the paths were recorded on; without, the place brings its own and the paths are stretched to it.
+    pub pitch: Option<Pitch>,
+    /// Which cameras are on air when.
+    pub shots: Shots,
 }
 
-fn boards() -> Vec<Board> {
-    let board = |text: &str, ground, ink| Board { text: text.into(), ground, ink };
-    vec![
-        board("HOLOPITCH", [0.02, 0.42, 0.36], [0.95, 0.98, 0.97]),
-        board("TABLETOP FC", [0.93, 0.93, 0.95], [0.10, 0.14, 0.35]),
-        board("NORTH BANK TEA", [0.10, 0.22, 0.62], [0.96, 0.96, 0.98]),
-        board("EXTRA TIME", [0.96, 0.78, 0.10], [0.12, 0.10, 0.10]),
-        board("OPEN GOAL", [0.62, 0.08, 0.14], [0.97, 0.95, 0.92]),
-    ]
+impl Default for FixtureOptions {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            frames: 125,
+            rate_hz: 25.0,
+            size_px: (1280, 720),
+            start_seconds: 0.0,
+            setting: Setting::default(),
+            pitch: None,
+            shots: Shots::default(),
+        }
+    }
 }
+
+/// Three letters of made-up teams.
+const TEAMS: [&str; 14] =
+    ["HAR", "FOR", "NOR", "MIL", "BAY", "OAK", "RIV", "SUN", "KIN", "PAL", "TOW", "LOW", "ELM", "VAL"];
 
 impl Fixture {
     /// Prepares a match on recorded or generated paths.
@@ -71,22 +98,58 @@ impl Fixture {
                 "a clip needs 1..100000 frames of at least 32×32 pixels".into(),
             ));
         }
-        let paths = paths.resampled(options.start_seconds, options.rate_hz, options.frames);
-        let rng = &mut Pcg64Mcg::seed_from_u64(options.seed);
-        let mut stadium = Stadium::new(Pitch::default(), boards(), Lights::floodlights(), rng.random());
+        let mut paths = paths.resampled(options.start_seconds, options.rate_hz, options.frames);
         let rate = options.rate_hz as f32;
-        let Cast { members, wardrobe } = Cast::new(&paths, rate, &stadium.pitch, options.seed)?;
+        let pitch = match (options.pitch, options.setting) {
+            (Some(pitch), _) => pitch,
+            (None, Setting::Drawn) => venue::pitch_of(options.seed),
+            (None, Setting::Plain) => Pitch::default(),
+        };
+        if options.pitch.is_none() {
+            // Made-up paths fill the usual pitch: they are stretched to this one.
+            let usual = Pitch::default();
+            let stretch = [pitch.length_m / usual.length_m, pitch.width_m / usual.width_m];
+            let [x, z] = stretch.map(|factor| factor as f32);
+            paths.people.iter_mut().flat_map(|p| &mut p.xz).for_each(|p| *p *= Vec2::new(x, z));
+            paths.ball.iter_mut().for_each(|b| *b *= Vec3::new(x, 1.0, z));
+        }
+        let Cast { members, wardrobe } = Cast::new(&paths, rate, &pitch, options.seed)?;
         let colours = wardrobe.teams.each_ref().map(|kit| kit.shirt);
-        stadium.crowd = vec![[0.90, 0.90, 0.92], colours[0], colours[1], [0.10, 0.11, 0.16]];
-        let cameras = follow(&options.tripod, options.size_px, &paths.ball, &paths.people, rate);
-        let score = ScoreBoard {
-            teams: ["HAR".into(), "FOR".into()],
+        let Venue { stadium, tripod, net, style } = match options.setting {
+            Setting::Plain => Venue::plain(options.seed, pitch, colours),
+            Setting::Drawn => Venue::drawn(options.seed, pitch, colours),
+        };
+        let play = Play {
+            people: &paths.people,
+            ball: &paths.ball,
+            pitch: &pitch,
+            rate_hz: rate,
+            size_px: options.size_px,
+        };
+        let film = film(&play, &tripod, &options.shots);
+        let rng = &mut Pcg64Mcg::seed_from_u64(options.seed ^ 0xF1_6E);
+        let mut things = props::goals(&pitch, &net);
+        let mut bystanders = Vec::new();
+        let mut score = ScoreBoard {
+            teams: [TEAMS[0].into(), TEAMS[1].into()],
             colours,
             score: [1, 0],
             clock_seconds: 27 * 60 + 14,
+            style,
         };
-        let goals = props::goals(&stadium.pitch);
-        Ok(Self { stadium, members, cameras, ball: paths.ball, score, goals })
+        if options.setting == Setting::Drawn {
+            let home = rng.random_range(0..TEAMS.len());
+            let away = (home + rng.random_range(1..TEAMS.len())) % TEAMS.len();
+            score.teams = [home, away].map(|team| TEAMS[team].to_owned());
+            score.score = [0; 2].map(|_| rng.random_range(0..4));
+            score.clock_seconds = rng.random_range(60..5400);
+            let dug_outs = furniture::dug_outs(rng, &stadium);
+            bystanders = bystanders::beside(rng, &stadium, &dug_outs, colours)?;
+            things.extend(dug_outs.into_iter().map(|dug_out| dug_out.solid));
+        }
+        let chain = Chain::new(options.setting, options.seed, &stadium, options.size_px);
+        let cameras = film.iter().map(|frame| frame.main.camera).collect();
+        Ok(Self { stadium, members, cameras, film, chain, bystanders, ball: paths.ball, score, net, things })
     }
 
     /// Frames that were prepared.
@@ -117,11 +180,10 @@ impl Fixture {
             }
             last = at;
         }
-        Scene {
-            stadium: &self.stadium,
-            actors,
-            solids: vec![self.goals.clone(), props::ball(self.ball[frame], turn)],
-        }
+        let mut solids: Vec<Cow<'_, Solid>> = self.things.iter().map(Cow::Borrowed).collect();
+        solids.extend(self.bystanders.iter().map(|person| Cow::Borrowed(&person.solid)));
+        solids.push(Cow::Owned(props::ball(self.ball[frame], turn)));
+        Scene { stadium: &self.stadium, actors, solids, nets: Some(self.net) }
     }
 
     /// The anchor of a member at a frame, world metres.
@@ -129,4 +191,31 @@ impl Fixture {
     pub fn anchor_m(&self, member: usize, frame: usize) -> Vec3 {
         self.members[member].movement.steps[frame].placement.anchor_m
     }
+}
+
+/// Films the play with the cameras of all shots.
+fn film(play: &Play<'_>, tripod: &Tripod, shots: &Shots) -> Vec<Frame> {
+    let takes: Vec<Vec<(Camera, Option<Focus>)>> = shots
+        .0
+        .iter()
+        .enumerate()
+        .map(|(index, shot)| {
+            let first = shots.first_frame(index).min(play.ball.len().saturating_sub(1));
+            let sharp = |cameras: Vec<Camera>| cameras.into_iter().map(|camera| (camera, None)).collect();
+            match shot.kind {
+                ShotKind::Main => sharp(play.main_camera(tripod)),
+                ShotKind::HighBehind => {
+                    // Behind the goal that the play is nearer to.
+                    let end = if play.ball.get(first).is_some_and(|ball| ball.x < 0.0) { -1.0 } else { 1.0 };
+                    sharp(play.high_behind(tripod, end))
+                }
+                ShotKind::CloseUp => play
+                    .close_up(tripod, first)
+                    .into_iter()
+                    .map(|(camera, focus)| (camera, Some(focus)))
+                    .collect(),
+            }
+        })
+        .collect();
+    shots.film(play.ball.len(), |shot, frame| takes[shot][frame])
 }

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use glam::{Quat, Vec3};
 use protocol::pitch::{GOAL_HEIGHT_M, GOAL_WIDTH_M, Pitch};
 
-use crate::{outfit::linear, render::Solid};
+use crate::{nets::NetLook, outfit::linear, render::Solid};
 
 /// Radius of the ball, metres (Law 2).
 pub const BALL_RADIUS_M: f32 = 0.11;
@@ -13,60 +13,80 @@ pub const BALL_RADIUS_M: f32 = 0.11;
 /// Height of a corner flag's post, metres (Law 1: at least 1.5).
 pub const FLAG_POST_M: f64 = 1.5;
 
-fn tube(solid: &mut Solid, from: Vec3, to: Vec3, radius: f32, colour: Vec3) {
+pub(crate) fn tube(solid: &mut Solid, from: Vec3, to: Vec3, radius: f32, colour: Vec3) {
     const SIDES: usize = 8;
     let axis = (to - from).normalize_or(Vec3::Y);
     let across = axis.any_orthonormal_vector();
     let other = axis.cross(across);
     let first = solid.positions.len() as u32;
-    for end in [from, to] {
+    // Short pieces, so that the lens can bend a long bar.
+    let pieces = (from.distance(to) / 0.6).ceil().max(1.0) as u32;
+    for ring in 0..=pieces {
+        let middle = from.lerp(to, ring as f32 / pieces as f32);
         for side in 0..SIDES {
             let angle = side as f32 / SIDES as f32 * TAU;
             let normal = across * angle.cos() + other * angle.sin();
-            solid.positions.push(end + normal * radius);
+            solid.positions.push(middle + normal * radius);
             solid.normals.push(normal);
         }
     }
     let sides = SIDES as u32;
-    for side in 0..sides {
-        let next = (side + 1) % sides;
-        let (a, b, c, d) = (first + side, first + next, first + sides + side, first + sides + next);
-        solid.triangles.extend([[a, b, c], [b, d, c]]);
-        solid.colours.extend([colour; 2]);
+    for ring in 0..pieces {
+        for side in 0..sides {
+            let next = (side + 1) % sides;
+            let (low, high) = (first + ring * sides, first + (ring + 1) * sides);
+            solid
+                .triangles
+                .extend([[low + side, low + next, high + side], [low + next, high + next, high + side]]);
+            solid.colours.extend([colour; 2]);
+        }
     }
 }
 
-/// Both goal frames and the four corner flags.
+/// Both goal frames with what holds their nets, and the corner flags, each a thing of its own.
 #[must_use]
-pub fn goals(pitch: &Pitch) -> Solid {
-    let mut solid = Solid::default();
+pub fn goals(pitch: &Pitch, net: &NetLook) -> Vec<Solid> {
     let white = linear([0.95, 0.95, 0.95]);
     let (half_x, half_z) = (pitch.length_m as f32 / 2.0, pitch.width_m as f32 / 2.0);
     let (half, high) = (GOAL_WIDTH_M as f32 / 2.0 + 0.06, GOAL_HEIGHT_M as f32 + 0.06);
+    let [top, bottom] = net.deep_m;
+    let mut things = Vec::new();
     for side in [-1.0, 1.0] {
         let x = half_x * side;
+        let mut goal = Solid::default();
         for z in [-half, half] {
-            tube(&mut solid, Vec3::new(x, 0.0, z), Vec3::new(x, high, z), 0.06, white);
-            let back = Vec3::new(x + 2.0 * side, 0.0, z);
-            tube(&mut solid, back, back + Vec3::Y * high, 0.02, white * 0.4);
-            tube(&mut solid, Vec3::new(x, high, z), back + Vec3::Y * high, 0.015, white * 0.5);
+            let post = Vec3::new(x, high, z);
+            tube(&mut goal, post.with_y(0.0), post, 0.06, white);
+            // A box net hangs on masts behind the goal; a leaning one on the frame's own stays.
+            let hold = Vec3::new(x + top * side, high, z);
+            let foot = Vec3::new(x + bottom * side, 0.0, z);
+            if top == bottom {
+                tube(&mut goal, foot, hold, 0.025, white * 0.3);
+            } else {
+                tube(&mut goal, foot, hold, 0.02, white * 0.8);
+                tube(&mut goal, post.with_y(0.04), foot.with_y(0.04), 0.02, white * 0.8);
+            }
+            tube(&mut goal, post, hold, 0.015, white * 0.5);
         }
-        tube(&mut solid, Vec3::new(x, high, -half - 0.06), Vec3::new(x, high, half + 0.06), 0.06, white);
+        tube(&mut goal, Vec3::new(x, high, -half - 0.06), Vec3::new(x, high, half + 0.06), 0.06, white);
+        things.push(goal);
         for z in [-half_z, half_z] {
             let foot = Vec3::new(x, 0.0, z);
-            tube(&mut solid, foot, foot + Vec3::Y * FLAG_POST_M as f32, 0.02, linear([0.9, 0.9, 0.2]));
-            let first = solid.positions.len() as u32;
+            let mut flag = Solid::default();
+            tube(&mut flag, foot, foot + Vec3::Y * FLAG_POST_M as f32, 0.02, linear([0.9, 0.9, 0.2]));
             for corner in
                 [Vec3::new(0.0, 1.5, 0.0), Vec3::new(0.0, 1.2, 0.0), Vec3::new(-0.42 * side, 1.35, 0.05)]
             {
-                solid.positions.push(foot + corner);
-                solid.normals.push(Vec3::new(0.0, 0.5, 0.87));
+                flag.positions.push(foot + corner);
+                flag.normals.push(Vec3::new(0.0, 0.5, 0.87));
             }
-            solid.triangles.push([first, first + 1, first + 2]);
-            solid.colours.push(linear([0.9, 0.15, 0.1]));
+            let first = flag.positions.len() as u32 - 3;
+            flag.triangles.push([first, first + 1, first + 2]);
+            flag.colours.push(linear([0.9, 0.15, 0.1]));
+            things.push(flag);
         }
     }
-    solid
+    things
 }
 
 /// The ball, white with dark patches, rolled by `turn`.

@@ -1,5 +1,6 @@
 //! A small z-buffer rasteriser: which triangle is in front at every sample of a regular grid laid over the picture.
 //! Samples lie in clip pixels, so the same code renders pictures (several samples per pixel) and exact depth at any grid.
+//! Memory is taken in tiles where something is drawn: people cover a few hundredths of a broadcast picture.
 
 use glam::{DVec3, Vec2, Vec3};
 use protocol::camera::Camera;
@@ -40,22 +41,48 @@ impl Grid {
 /// No triangle.
 pub const NOTHING: u32 = u32::MAX;
 
+/// Side of a tile, samples.
+pub const TILE: usize = 16;
+
+/// What is in front at one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Index of the triangle, counted over everything drawn; [`NOTHING`] where nothing is.
+    pub triangle: u32,
+    /// 1 / depth along the optical axis; 0 where nothing is.
+    pub inverse_depth: f32,
+}
+
+const EMPTY: Hit = Hit { triangle: NOTHING, inverse_depth: 0.0 };
+
 /// The front-most triangle of every sample.
 #[derive(Clone, Debug)]
 pub struct Raster {
     /// The samples.
     pub grid: Grid,
-    /// 1 / depth along the optical axis; 0 where nothing is.
-    pub inverse_depth: Vec<f32>,
-    /// Index of the triangle, counted over everything drawn; [`NOTHING`] where nothing is.
-    pub triangle: Vec<u32>,
+    tiles_across: usize,
+    /// Where each tile's samples begin in `hits`; [`NOTHING`] for tiles without any.
+    slots: Vec<u32>,
+    hits: Vec<Hit>,
 }
 
 /// A vertex in the grid: sample coordinates and 1 / depth.
 pub type Projected = Option<Vec3>;
 
-/// Projects points into `grid`; `None` behind the camera. Radial distortion is not drawn.
+/// Projects points into `grid`, with the lens's distortion; `None` behind the camera and beyond the lens's reach.
 pub fn project(camera: &Camera, grid: &Grid, points: &[Vec3], out: &mut Vec<Projected>) {
+    project_moving(camera, grid, points, points, 0.0, out);
+}
+
+/// As [`project`], for points that are `share` of the way from `points` to `later` (which may lie outside 0..1).
+pub fn project_moving(
+    camera: &Camera,
+    grid: &Grid,
+    points: &[Vec3],
+    later: &[Vec3],
+    share: f32,
+    out: &mut Vec<Projected>,
+) {
     out.clear();
     let rotation = camera.rotation.as_mat3();
     let scale = (camera.focal_px * grid.per_px) as f32;
@@ -64,19 +91,62 @@ pub fn project(camera: &Camera, grid: &Grid, points: &[Vec3], out: &mut Vec<Proj
         ((centre.x - grid.origin_px[0]) * grid.per_px) as f32,
         ((centre.y - grid.origin_px[1]) * grid.per_px) as f32,
     );
-    out.extend(points.iter().map(|&point| {
+    let k1 = camera.k1 as f32;
+    out.extend(points.iter().zip(later).map(|(&point, &later)| {
+        let point = point + (later - point) * share;
         // The difference is taken in double precision: the camera is far away.
         let p = rotation * (DVec3::from(point) - camera.position).as_vec3();
-        (p.z > 0.3).then(|| (p.truncate() / p.z * scale + offset).extend(1.0 / p.z))
+        if p.z <= 0.3 {
+            return None;
+        }
+        let n = p.truncate() / p.z;
+        let bent = k1 * n.length_squared();
+        // Where three times the bend reaches −1 the model folds back into the picture; no lens shows that.
+        (bent > -0.3).then(|| (n * (1.0 + bent) * scale + offset).extend(1.0 / p.z))
     }));
+}
+
+/// The least whole number that is not below; `ceil` is a call on processors without a rounding instruction.
+fn above(value: f32) -> i32 {
+    let cut = value as i32;
+    cut + i32::from((cut as f32) < value)
+}
+
+/// The greatest whole number that is not above.
+fn below(value: f32) -> i32 {
+    let cut = value as i32;
+    cut - i32::from(cut as f32 > value)
 }
 
 impl Raster {
     /// An empty raster.
     #[must_use]
     pub fn new(grid: Grid) -> Self {
-        let count = grid.width * grid.height;
-        Self { grid, inverse_depth: vec![0.0; count], triangle: vec![NOTHING; count] }
+        let tiles_across = grid.width.div_ceil(TILE);
+        let slots = vec![NOTHING; tiles_across * grid.height.div_ceil(TILE)];
+        Self { grid, tiles_across, slots, hits: Vec::new() }
+    }
+
+    /// What is in front at sample (i, j); `None` where nothing is.
+    #[must_use]
+    pub fn at(&self, i: usize, j: usize) -> Option<Hit> {
+        let slot = *self.slots.get((j / TILE) * self.tiles_across + i / TILE)?;
+        let hit = *self.hits.get((slot as usize).checked_add((j % TILE) * TILE + i % TILE)?)?;
+        (hit.triangle != NOTHING).then_some(hit)
+    }
+
+    /// The tiles with something in them: samples (i, j) of their first corners.
+    pub fn tiles(&self) -> impl Iterator<Item = [usize; 2]> {
+        let across = self.tiles_across;
+        let full = self.slots.iter().enumerate().filter(|(_, slot)| **slot != NOTHING);
+        full.map(move |(index, _)| [index % across * TILE, index / across * TILE])
+    }
+
+    /// The samples of the tile that begins at (i, j), row by row; `None` when nothing is in it.
+    #[must_use]
+    pub fn tile(&self, i: usize, j: usize) -> Option<&[Hit]> {
+        let slot = *self.slots.get((j / TILE) * self.tiles_across + i / TILE)? as usize;
+        self.hits.get(slot..slot.checked_add(TILE * TILE)?)
     }
 
     /// Draws `triangles` over projected `vertices`; triangle `k` gets the index `first + k`.
@@ -89,8 +159,8 @@ impl Raster {
             };
             let low = a.min(b).min(c);
             let high = a.max(b).max(c);
-            let (x0, x1) = ((low.x.ceil() as i32).max(0), (high.x.floor() as i32).min(width - 1));
-            let (y0, y1) = ((low.y.ceil() as i32).max(0), (high.y.floor() as i32).min(height - 1));
+            let (x0, x1) = (above(low.x).max(0), below(high.x).min(width - 1));
+            let (y0, y1) = (above(low.y).max(0), below(high.y).min(height - 1));
             if x0 > x1 || y0 > y1 {
                 continue;
             }
@@ -104,17 +174,22 @@ impl Raster {
             let (cx, cy) = (-(b.y - a.y) * scale, (b.x - a.x) * scale);
             for y in y0..=y1 {
                 let dy = y as f32 - a.y;
-                let row = y as usize * self.grid.width;
+                let row = y as usize / TILE * self.tiles_across;
+                let line = y as usize % TILE * TILE;
                 for x in x0..=x1 {
                     let dx = x as f32 - a.x;
                     let wb = dx * bx + dy * by;
                     let wc = dx * cx + dy * cy;
                     if wb >= 0.0 && wc >= 0.0 && wb + wc <= 1.0 {
                         let inverse = a.z + (b.z - a.z) * wb + (c.z - a.z) * wc;
-                        let place = row + x as usize;
-                        if inverse > self.inverse_depth[place] {
-                            self.inverse_depth[place] = inverse;
-                            self.triangle[place] = first + index as u32;
+                        let tile = row + x as usize / TILE;
+                        if self.slots[tile] == NOTHING {
+                            self.slots[tile] = self.hits.len() as u32;
+                            self.hits.resize(self.hits.len() + TILE * TILE, EMPTY);
+                        }
+                        let hit = &mut self.hits[self.slots[tile] as usize + line + x as usize % TILE];
+                        if inverse > hit.inverse_depth {
+                            *hit = Hit { triangle: first + index as u32, inverse_depth: inverse };
                         }
                     }
                 }
@@ -155,14 +230,11 @@ mod tests {
         let mut hits = 0;
         for j in 0..grid.height {
             for i in 0..grid.width {
-                let place = j * grid.width + i;
-                if raster.triangle[place] == NOTHING {
-                    continue;
-                }
+                let Some(hit) = raster.at(i, j) else { continue };
                 hits += 1;
-                assert_eq!(raster.triangle[place], 7);
+                assert_eq!(hit.triangle, 7);
                 let ground = camera.ground_point(grid.pixel(i, j).into()).unwrap();
-                let depth = f64::from(1.0 / raster.inverse_depth[place]);
+                let depth = f64::from(1.0 / hit.inverse_depth);
                 assert!((depth - camera.depth(ground)).abs() < 2e-3);
             }
         }
@@ -177,11 +249,10 @@ mod tests {
         let grid = Grid::over_pixels([0, 0], [320, 180], 1);
         let mut projected = Vec::new();
         project(&camera, &grid, &points, &mut projected);
-        let centre = 90 * 320 + 160;
         for order in [[[0u32, 1, 2], [3, 4, 5]], [[3, 4, 5], [0, 1, 2]]] {
             let mut raster = Raster::new(grid);
             raster.draw(&projected, &order, 0);
-            assert_eq!(order[raster.triangle[centre] as usize][0], 3);
+            assert_eq!(order[raster.at(160, 90).unwrap().triangle as usize][0], 3);
         }
     }
 }

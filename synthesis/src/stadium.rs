@@ -1,18 +1,16 @@
-//! Everything around the players: mown grass with its lines, boards, stands with people, goals and nets.
-//! Lines and stripes are filtered analytically over each pixel's footprint, so they neither crawl nor break.
+//! The empty stadium as rays meet it: grass first, round it boards, stands in tiers, roofs, and beyond them the sky.
+//! One upright profile per side of the pitch; the sides meet in the corners where their planes do.
 
-use std::f32::consts::TAU;
-
-use glam::{Mat3, Vec2, Vec3};
-use protocol::{
-    camera::Camera,
-    pitch::{GOAL_HEIGHT_M, GOAL_WIDTH_M, LINE_WIDTH_M, Marking, Pitch},
-};
+use glam::{Vec2, Vec3};
+use protocol::pitch::Pitch;
 
 use crate::{
-    noise,
-    outfit::{Srgb, linear},
+    crowd::{Crowd, CrowdLook},
+    outfit::Srgb,
     paint::Lights,
+    rays::PixelRays,
+    stands::Wall,
+    turf::{Turf, TurfLook},
 };
 
 /// An advertising board.
@@ -26,38 +24,100 @@ pub struct Board {
     pub ink: Srgb,
 }
 
+/// A row of boards along a side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardRow {
+    /// Distance behind the line, metres.
+    pub gap_m: f32,
+    /// Lower and upper edge, metres above the ground.
+    pub high_m: [f32; 2],
+    /// Whether it shines by itself (LED), with the same text all along.
+    pub led: bool,
+}
+
+/// A block of seats rising outwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tier {
+    /// Distance of its first row behind the foot of the stand, metres.
+    pub from_m: f32,
+    /// Height of its first row, metres.
+    pub low_m: f32,
+    /// Rise per metre.
+    pub slope: f32,
+    /// How far it reaches outwards, metres.
+    pub deep_m: f32,
+}
+
+/// A roof over a stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Roof {
+    /// Distance of its front edge behind the foot of the stand, metres; negative reaches over the boards.
+    pub edge_m: f32,
+    /// Height, metres.
+    pub height_m: f32,
+    /// How far it reaches outwards, metres.
+    pub deep_m: f32,
+    /// Half its length along the side, metres.
+    pub half_m: f32,
+}
+
+/// Everything beyond one line of the pitch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Side {
+    /// Unit vector away from the pitch.
+    pub outward: Vec3,
+    /// Distance of the line from the centre mark, metres.
+    pub line_m: f32,
+    /// Half the length of the boards, metres.
+    pub half_m: f32,
+    /// Boards, front row first.
+    pub boards: Vec<BoardRow>,
+    /// Where the stand begins behind the line, and the height of its barrier, metres.
+    pub foot_m: f32,
+    /// Height of the wall in front of the first row, metres.
+    pub barrier_m: f32,
+    /// Seats.
+    pub tiers: Vec<Tier>,
+    /// Its roof.
+    pub roof: Option<Roof>,
+}
+
+/// What surrounds the grass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surroundings {
+    /// The four sides: far, right, left, near.
+    pub sides: [Side; 4],
+    /// Boards, repeated round the pitch.
+    pub boards: Vec<Board>,
+    /// The people in the stands.
+    pub crowd: CrowdLook,
+    /// Colour of the roofs from below, linear.
+    pub roof: Vec3,
+    /// Colour of barriers and fascias, linear.
+    pub structure: Vec3,
+    /// Light from above the roofs, linear.
+    pub sky: Vec3,
+}
+
 /// How a stadium looks.
 #[derive(Clone, Debug)]
 pub struct Stadium {
     /// The pitch.
     pub pitch: Pitch,
-    /// Colour of the grass.
-    pub grass: Srgb,
-    /// How much lighter every other mown stripe is.
-    pub mowing: f32,
-    /// Width of a mown stripe, metres.
-    pub stripe_m: f32,
-    /// Boards, repeated round the pitch.
-    pub boards: Vec<Board>,
-    /// Colour of the ground outside the grass.
-    pub apron: Srgb,
-    /// Colours that the home crowd wears.
-    pub crowd: Vec<Srgb>,
-    /// Brightness of the stands.
-    pub stands_light: f32,
-    /// Varies noise and crowd.
-    pub seed: u32,
+    /// The grass and its lines.
+    pub turf: Turf,
+    /// What surrounds it.
+    pub around: Surroundings,
     /// The lights.
     pub lights: Lights,
-    paint: Vec<Painted>,
-}
-
-/// A marking with its bounding box.
-#[derive(Clone, Copy, Debug)]
-struct Painted {
-    marking: Marking,
-    low: Vec2,
-    high: Vec2,
+    /// Whether the lamps are the sun, which roofs keep off the grass.
+    pub sunny: bool,
+    /// Varies what is drawn on boards and seats.
+    pub seed: u32,
+    pub(crate) crowd: Crowd,
+    half: Vec2,
+    /// What the lamps give a level surface.
+    level: Vec3,
 }
 
 /// What a ray through the empty stadium meets.
@@ -65,282 +125,225 @@ struct Painted {
 pub struct Seen {
     /// Light, linear.
     pub light: Vec3,
-    /// Depth along the ray in units of the (unnormalised) pixel direction: metres along the optical axis.
+    /// Depth along the optical axis, metres.
     pub depth_m: f32,
-    /// The place on the ground, when it is the ground (shadows fall there).
-    pub ground: Option<Vec2>,
+    /// Whether it is a wall, behind which people can stand.
+    pub upright: bool,
 }
 
-/// Rays through pixels, linear in the pixel.
-#[derive(Clone, Copy, Debug)]
-pub struct PixelRays {
-    origin: Vec3,
-    corner: Vec3,
-    across: Vec3,
-    down: Vec3,
+/// Shares of light that people and things keep off a place of the ground.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shadow {
+    /// Of the lamps' light.
+    pub lamps: f32,
+    /// Of the sky's light.
+    pub sky: f32,
 }
 
-impl PixelRays {
-    /// The rays of an undistorted camera.
-    #[must_use]
-    pub fn new(camera: &Camera) -> Self {
-        let back: Mat3 = camera.rotation.as_mat3().transpose();
-        let focal = camera.focal_px as f32;
-        let centre = camera.centre_px().as_vec2();
-        Self {
-            origin: camera.position.as_vec3(),
-            corner: back * Vec3::new(-centre.x / focal, -centre.y / focal, 1.0),
-            across: back * Vec3::new(1.0 / focal, 0.0, 0.0),
-            down: back * Vec3::new(0.0, 1.0 / focal, 0.0),
+/// The nearest thing so far.
+pub(crate) struct Nearest {
+    pub(crate) depth: f32,
+    pub(crate) wall: Option<Wall>,
+}
+
+impl Side {
+    /// Offers what a ray meets on this side.
+    fn meet(&self, origin: Vec3, direction: Vec3, nearest: &mut Nearest) {
+        let (start, speed) = (origin.dot(self.outward) - self.line_m, direction.dot(self.outward));
+        let along_axis = self.outward.cross(Vec3::Y);
+        let mut offer = |depth: f32, wall: &dyn Fn(f32, f32) -> Option<Wall>| {
+            if depth > 0.5 && depth < nearest.depth {
+                let point = origin + direction * depth;
+                if let Some(wall) = wall(point.dot(along_axis), point.y) {
+                    (nearest.depth, nearest.wall) = (depth, Some(wall));
+                }
+            }
+        };
+        let upright = |at: f32| (at - start) / speed;
+        for (row, board) in self.boards.iter().enumerate() {
+            offer(upright(board.gap_m), &|along, height| {
+                let inside =
+                    height >= board.high_m[0] && height < board.high_m[1] && along.abs() <= self.half_m;
+                inside.then_some(if speed > 0.0 { Wall::Board { row, along, height } } else { Wall::Back })
+            });
+        }
+        if speed > 0.0 {
+            offer(upright(self.foot_m), &|along, height| {
+                (0.0..self.barrier_m).contains(&height).then_some(Wall::Barrier { along, height })
+            });
+        }
+        for (index, tier) in self.tiers.iter().enumerate() {
+            let first = self.foot_m + tier.from_m;
+            // A camera in the stand looks out of an opening.
+            if start > first && origin.y < tier.low_m + tier.slope * (start - first) + 1.0 {
+                continue;
+            }
+            // height = low + slope · (out − first)
+            let a = direction.y - tier.slope * speed;
+            let depth = (tier.low_m + tier.slope * (start - first) - origin.y) / a;
+            offer(depth, &|along, _| {
+                let out = start + speed * depth - first;
+                let up = out * (1.0 + tier.slope * tier.slope).sqrt() + index as f32 * 30.72;
+                let back = out / tier.deep_m;
+                (0.0..1.0).contains(&back).then_some(Wall::Seats {
+                    along,
+                    up,
+                    back,
+                    from_behind: speed < 0.0,
+                })
+            });
+            if index > 0 && speed > 0.0 {
+                let foot = tier.low_m - 5.5;
+                offer(upright(first), &|along, height| {
+                    (foot..tier.low_m)
+                        .contains(&height)
+                        .then_some(Wall::Fascia { along, height: height - foot })
+                });
+            }
+        }
+        if let Some(roof) = &self.roof {
+            let edge = self.foot_m + roof.edge_m;
+            let over = |along: f32| along.abs() <= roof.half_m;
+            offer((roof.height_m - origin.y) / direction.y, &|along, _| {
+                let out = start + speed * (roof.height_m - origin.y) / direction.y - edge;
+                ((0.0..roof.deep_m).contains(&out) && over(along)).then_some(Wall::Roof)
+            });
+            if speed > 0.0 {
+                offer(upright(edge), &|along, height| {
+                    let inside = (0.0..1.6).contains(&(height - roof.height_m)) && over(along);
+                    inside.then_some(Wall::RoofEdge)
+                });
+            }
         }
     }
 
-    fn direction(&self, pixel: Vec2) -> Vec3 {
-        self.corner + self.across * pixel.x + self.down * pixel.y
+    /// Share of the sun that passes this side's stand and roof to a point.
+    fn passes(&self, point: Vec3, towards: Vec3) -> f32 {
+        let speed = towards.dot(self.outward);
+        if speed <= 1e-3 {
+            return 1.0;
+        }
+        let (edge, height, half) = match &self.roof {
+            Some(roof) => (self.foot_m + roof.edge_m, roof.height_m, roof.half_m),
+            None => match self.tiers.last() {
+                Some(tier) => (
+                    self.foot_m + tier.from_m + tier.deep_m,
+                    tier.low_m + tier.slope * tier.deep_m,
+                    self.half_m + 20.0,
+                ),
+                None => return 1.0,
+            },
+        };
+        let way = (self.line_m + edge - point.dot(self.outward)) / speed;
+        if way <= 0.0 {
+            return 1.0;
+        }
+        let at = point + towards * way;
+        // The sun is half a degree wide: the edge of a shadow grows soft with the way.
+        let soft = 0.012 * way;
+        let above = ((at.y - height) / soft + 0.5).clamp(0.0, 1.0);
+        let beside = ((at.dot(self.outward.cross(Vec3::Y)).abs() - half) / soft + 0.5).clamp(0.0, 1.0);
+        above.max(beside)
     }
 }
-
-/// Distance of the boards from the lines, metres.
-const BOARD_GAP_M: [f32; 2] = [4.5, 5.0];
-const BOARD_HEIGHT_M: f32 = 0.95;
-/// Where the stands begin behind the boards, and at what height.
-const STAND_GAP_M: f32 = 3.5;
-const STAND_FOOT_M: f32 = 1.4;
 
 impl Stadium {
     /// A stadium with the given looks.
     #[must_use]
-    pub fn new(pitch: Pitch, boards: Vec<Board>, lights: Lights, seed: u32) -> Self {
-        let paint = pitch
-            .markings()
-            .into_iter()
-            .map(|marking| {
-                let points = marking.sample(0.5);
-                let reach = match marking {
-                    Marking::Spot { radius_m, .. } => radius_m,
-                    _ => LINE_WIDTH_M,
-                } as f32;
-                let low = points.iter().fold(Vec2::MAX, |a, p| a.min(p.as_vec2())) - reach - 0.2;
-                let high = points.iter().fold(Vec2::MIN, |a, p| a.max(p.as_vec2())) + reach + 0.2;
-                Painted { marking, low, high }
-            })
-            .collect();
+    pub fn new(
+        pitch: Pitch,
+        turf: TurfLook,
+        around: Surroundings,
+        lights: Lights,
+        sunny: bool,
+        seed: u32,
+    ) -> Self {
+        let level = lights.lamps.iter().map(|(towards, colour)| *colour * towards.y.max(0.0)).sum();
         Self {
             pitch,
-            grass: [0.33, 0.47, 0.16],
-            mowing: 0.16,
-            stripe_m: 5.25,
-            boards,
-            apron: [0.20, 0.33, 0.16],
-            crowd: vec![[0.85, 0.85, 0.88], [0.10, 0.10, 0.13], [0.15, 0.25, 0.55]],
-            stands_light: 0.5,
-            seed,
+            turf: Turf::new(&pitch, turf, seed),
+            crowd: Crowd::new(around.crowd.clone(), seed),
+            around,
             lights,
-            paint,
+            sunny,
+            seed,
+            half: Vec2::new(pitch.length_m as f32, pitch.width_m as f32) / 2.0,
+            level,
         }
     }
 
-    /// What the camera sees at a pixel when nobody is there. `shadow` is the share of each lamp that is hidden, and
-    /// after the lamps of the sky.
+    /// Brightness of a white level surface in the open: what the iris is set by.
     #[must_use]
-    pub fn see(&self, rays: &PixelRays, pixel: Vec2, shadow: impl Fn(usize) -> f32) -> Seen {
-        let direction = rays.direction(pixel);
-        let (half_x, half_z) = (self.pitch.length_m as f32 / 2.0, self.pitch.width_m as f32 / 2.0);
-        let ground = (direction.y < -1e-6).then(|| -rays.origin.y / direction.y);
-        let mut best: Option<(f32, Wall, f32, f32)> = None;
-        let faces = [
-            (Vec3::Z, -(half_z + BOARD_GAP_M[0])),
-            (Vec3::X, half_x + BOARD_GAP_M[1]),
-            (Vec3::X, -(half_x + BOARD_GAP_M[1])),
-        ];
-        for (normal, place) in faces {
-            let outward = place.signum();
-            // The board stands upright; behind it rise the stands as two slopes with a fascia between.
-            let upright = |at: f32| (at - rays.origin.dot(normal)) / direction.dot(normal);
-            let mut offer = |depth: f32, wall: Wall, height: f32| {
-                if depth.is_finite() && depth > 0.5 && best.is_none_or(|(nearest, ..)| depth < nearest) {
-                    let point = rays.origin + direction * depth;
-                    // Along the wall from left to right, as somebody on the pitch reads it.
-                    let along = if normal == Vec3::Z { point.x } else { point.z * outward };
-                    best = Some((depth, wall, along, height));
-                }
-            };
-            let depth = upright(place);
-            let point = rays.origin + direction * depth;
-            let height = point.y;
-            // Boards meet at the corners.
-            let (along, end) = if normal == Vec3::Z {
-                (point.x, half_x + BOARD_GAP_M[1])
-            } else {
-                (point.z, half_z + BOARD_GAP_M[0])
-            };
-            if (0.0..BOARD_HEIGHT_M).contains(&height) && along.abs() <= end {
-                offer(depth, Wall::Board, height);
-            }
-            let foot = place + outward * STAND_GAP_M;
-            let depth = upright(foot);
-            let height = (rays.origin + direction * depth).y;
-            if (0.0..STAND_FOOT_M).contains(&height) {
-                offer(depth, Wall::Barrier, height);
-            }
-            for (from, low, slope, deep) in
-                [(0.0f32, STAND_FOOT_M, 0.52f32, 24.0f32), (22.0, 17.5, 0.66, 34.0)]
-            {
-                // height = low + slope · (outward · (p·normal) − |foot| − from)
-                let a = direction.y - slope * outward * direction.dot(normal);
-                let b = low + slope * (outward * rays.origin.dot(normal) - foot.abs() - from) - rays.origin.y;
-                let depth = b / a;
-                let point = rays.origin + direction * depth;
-                let back = outward * point.dot(normal) - foot.abs() - from;
-                if (0.0..deep).contains(&back) {
-                    offer(depth, Wall::Seats, back * (1.0 + slope * slope).sqrt() + from * 10.0);
-                }
-            }
-            let depth = upright(foot + outward * 22.0);
-            let height = (rays.origin + direction * depth).y;
-            if (12.0..17.5).contains(&height) {
-                offer(depth, Wall::Fascia, height - 12.0);
-            }
-        }
-        if let Some(depth) = ground
-            && best.is_none_or(|(nearest, ..)| depth < nearest)
-        {
-            let hit = rays.origin + direction * depth;
-            let place = Vec2::new(hit.x, hit.z);
-            // How far the hit moves on the ground per pixel across and down.
-            let slide = |step: Vec3| {
-                let moved = depth * (step - direction * (step.y / direction.y));
-                Vec2::new(moved.x, moved.z)
-            };
-            let light = self.turf(place, [slide(rays.across), slide(rays.down)]);
-            let lamps = &self.lights.lamps;
-            let lamp_light = lamps.iter().enumerate().fold(Vec3::ZERO, |sum, (index, (towards, colour))| {
-                sum + *colour * towards.y * (1.0 - shadow(index))
-            });
-            let open = 1.0 - 0.6 * shadow(lamps.len());
-            let light = light * (lamp_light + self.lights.sky * open);
-            return Seen { light, depth_m: depth, ground: Some(place) };
-        }
-        let Some((depth, wall, along, height)) = best else {
-            // Above the stands: the dark underside of a roof.
-            return Seen { light: Vec3::new(0.012, 0.013, 0.017), depth_m: 1e6, ground: None };
-        };
-        let sample = depth * rays.across.length();
-        let light = match wall {
-            Wall::Board => self.board(along, height, sample) * 0.8,
-            Wall::Barrier => self.barrier(along, height, sample),
-            Wall::Seats => self.seats(along, height, sample) * self.stands_light,
-            Wall::Fascia => self.fascia(along, height, sample),
-        };
-        Seen { light, depth_m: depth, ground: None }
+    pub fn level_light(&self) -> f32 {
+        self.level.y + self.lights.sky.y
     }
 
-    /// Colour of the ground: grass, mowing stripes, lines. `steps` is how far a pixel across and down reaches.
-    fn turf(&self, p: Vec2, steps: [Vec2; 2]) -> Vec3 {
-        let (half_x, half_z) = (self.pitch.length_m as f32 / 2.0, self.pitch.width_m as f32 / 2.0);
-        let reach =
-            |normal: Vec2| (normal.dot(steps[0]).powi(2) + normal.dot(steps[1]).powi(2)).sqrt().max(1e-5);
-        let outside = (p.x.abs() - half_x).max(p.y.abs() - half_z);
-        if outside > 3.2 {
-            let grain = 1.0 + 0.05 * noise::value(p * 3.0, self.seed);
-            return linear(self.apron) * grain;
-        }
-        // Mown stripes: a square wave filtered over the footprint.
-        let place = (p.x + half_x) / self.stripe_m;
-        let wide = (reach(Vec2::X) / self.stripe_m).max(0.04);
-        let edge = (place.rem_euclid(2.0) - 1.0).abs(); // 1 at the middle of one stripe, 0 at the middle of the other
-        let stripe = ((edge - 0.5) / wide + 0.5).clamp(0.0, 1.0);
-        let blade = reach(Vec2::Y);
-        let grain = noise::value(p * Vec2::new(7.0, 4.0), self.seed) * (0.10 / (0.10 + blade))
-            + 0.9 * noise::value(p * 1.1, self.seed ^ 1)
-            + 1.2 * noise::value(p * 0.21, self.seed ^ 2);
-        let tint = Vec3::new(1.0 + 0.03 * noise::value(p * 0.13, self.seed ^ 3), 1.0, 1.0);
-        let grass = linear(self.grass) * tint * (1.0 + self.mowing * (stripe - 0.5)) * (1.0 + 0.035 * grain);
-        let paint = self.paint_at(p, &reach);
-        grass.lerp(linear([0.90, 0.93, 0.90]), paint * (0.94 + 0.06 * noise::value(p * 2.3, self.seed ^ 7)))
-    }
-
-    /// Share of a pixel that is covered by line paint.
-    fn paint_at(&self, p: Vec2, reach: &impl Fn(Vec2) -> f32) -> f32 {
-        let half_line = LINE_WIDTH_M as f32 / 2.0;
-        let ramp = |t: f32| (t + 0.5).clamp(0.0, 1.0);
-        let mut paint: f32 = 0.0;
-        for painted in &self.paint {
-            let margin = reach(Vec2::X).max(reach(Vec2::Y));
-            if p.cmplt(painted.low - margin).any() || p.cmpgt(painted.high + margin).any() {
-                continue;
-            }
-            let band = |signed: f32, normal: Vec2, half: f32| {
-                let step = reach(normal);
-                ramp((signed + half) / step) - ramp((signed - half) / step)
-            };
-            let cover = match painted.marking {
-                Marking::Line { from, to } => {
-                    let (from, to) = (from.as_vec2(), to.as_vec2());
-                    let along = (to - from).normalize_or(Vec2::X);
-                    let normal = along.perp();
-                    let length = from.distance(to);
-                    let middle = (p - from).dot(along) - length / 2.0;
-                    band((p - from).dot(normal), normal, half_line)
-                        * band(middle, along, length / 2.0 + half_line)
-                }
-                Marking::Arc { centre, radius_m, start, sweep } => {
-                    let offset = p - centre.as_vec2();
-                    let turn = (offset.to_angle() - start as f32).rem_euclid(TAU);
-                    if turn <= sweep as f32 + 1e-4 {
-                        band(offset.length() - radius_m as f32, offset.normalize_or(Vec2::X), half_line)
-                    } else {
-                        0.0
-                    }
-                }
-                Marking::Spot { centre, radius_m } => {
-                    let offset = p - centre.as_vec2();
-                    let normal = offset.normalize_or(Vec2::X);
-                    band(offset.length(), normal, radius_m as f32)
-                }
-            };
-            paint = paint.max(cover);
-        }
-        paint
-    }
-
-    /// How much of the light from behind a goal net stays, and the light of the net, for a ray up to `until_m` deep.
+    /// Share of the sun that reaches a point past stands and roofs; 1 for lamps that no roof hides.
     #[must_use]
-    pub fn nets(&self, rays: &PixelRays, pixel: Vec2, until_m: f32) -> (f32, Vec3) {
-        let direction = rays.direction(pixel);
-        let half_x = self.pitch.length_m as f32 / 2.0;
-        let (half_goal, bar) = (GOAL_WIDTH_M as f32 / 2.0, GOAL_HEIGHT_M as f32);
-        let (mut open, mut light) = (1.0, Vec3::ZERO);
-        for side in [-1.0f32, 1.0] {
-            // Inside the box of the goal? Back and side nets, roof of the net.
-            for (axis, place) in [(0, half_x + 2.0), (2, half_goal), (2, -half_goal), (1, bar)] {
-                let (o, d) = (rays.origin[axis], direction[axis]);
-                let place = if axis == 0 { place * side } else { place };
-                let depth = (place - o) / d;
-                if !(depth > 0.5 && depth < until_m) {
-                    continue;
-                }
-                let hit = rays.origin + direction * depth;
-                let back = hit.x * side - half_x;
-                let inside = (-0.001..2.001).contains(&back)
-                    && (0.0..bar + 0.001).contains(&hit.y)
-                    && hit.z.abs() < half_goal + 0.001;
-                if inside {
-                    let knots = |a: f32| if (a / 0.12).rem_euclid(1.0) < 0.5 { 1.0 } else { 0.6 };
-                    let cover = 0.16 * knots(hit.y + hit.x) * knots(hit.z + hit.x * 0.3);
-                    light = light * (1.0 - cover) + Vec3::splat(0.62) * cover;
-                    open *= 1.0 - cover;
-                }
+    pub fn sun_at(&self, point: Vec3) -> f32 {
+        match self.lights.lamps.first() {
+            Some((towards, _)) if self.sunny => {
+                self.around.sides.iter().map(|side| side.passes(point, *towards)).product()
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// The light on somebody who stands at `point`: the sun is weaker in the stands' shade.
+    #[must_use]
+    pub fn lights_at(&self, point: Vec3) -> Lights {
+        let sun = self.sun_at(point);
+        let mut lights = self.lights.clone();
+        if sun < 1.0 {
+            lights.lamps.iter_mut().for_each(|(_, colour)| *colour *= sun);
+            lights.bounce *= 0.4 + 0.6 * sun;
+        }
+        lights
+    }
+
+    /// What the camera sees at a pixel when nobody is there.
+    #[must_use]
+    pub fn see(&self, rays: &PixelRays, pixel: Vec2, shadow: impl FnOnce() -> Shadow) -> Seen {
+        let view = rays.through(pixel);
+        let (origin, direction) = (rays.origin, view.direction);
+        let mut nearest = Nearest { depth: f32::MAX, wall: None };
+        let mut place = Vec2::ZERO;
+        let mut on_grass = false;
+        if direction.y < -1e-6 {
+            nearest.depth = -origin.y / direction.y;
+            let hit = origin + direction * nearest.depth;
+            place = Vec2::new(hit.x, hit.z);
+            on_grass = (place.abs() - self.half).max_element() < 1.0;
+        }
+        let ground = nearest.depth;
+        for side in &self.around.sides {
+            // Nothing stands over the grass: only what the camera looks across can be in front of it.
+            if !on_grass || origin.dot(side.outward) > side.line_m {
+                side.meet(origin, direction, &mut nearest);
             }
         }
-        (open, light)
+        if let Some(wall) = nearest.wall {
+            let sample = nearest.depth * view.across.length();
+            let light = self.wall(&wall, origin + direction * nearest.depth, sample);
+            return Seen { light, depth_m: nearest.depth, upright: true };
+        }
+        if ground == f32::MAX {
+            let up = (direction.y / direction.length()).clamp(0.0, 1.0);
+            return Seen { light: self.around.sky * (1.15 - 0.5 * up), depth_m: 1e6, upright: false };
+        }
+        // How far the hit moves on the ground per pixel across and down.
+        let slide = |step: Vec3| {
+            let moved = ground * (step - direction * (step.y / direction.y));
+            Vec2::new(moved.x, moved.z)
+        };
+        let albedo = self.turf.albedo(place, [slide(view.across), slide(view.down)]);
+        let shadow = shadow();
+        let sun = if self.sunny { self.sun_at(Vec3::new(place.x, 0.0, place.y)) } else { 1.0 };
+        let lamps = self.level * (sun * (1.0 - shadow.lamps));
+        Seen {
+            light: albedo * (lamps + self.lights.sky * (1.0 - 0.6 * shadow.sky)),
+            depth_m: ground,
+            upright: false,
+        }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Wall {
-    Board,
-    Barrier,
-    Seats,
-    Fascia,
 }

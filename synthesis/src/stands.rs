@@ -1,102 +1,111 @@
-//! What stands behind the lines: boards, barrier, fascia and rows of people. Colours by position along and up the wall.
+//! Colours of what stands behind the lines: boards, barriers, seats, fascias, roofs, by position along and up the wall.
 
 use glam::{Vec2, Vec3};
 
 use crate::{
-    lettering, noise,
-    outfit::{Srgb, linear},
-    stadium::Stadium,
+    lettering,
+    outfit::linear,
+    stadium::{Board, Stadium},
 };
 
+/// What a ray met, with the place on it in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Wall {
+    /// The front of a board of a row.
+    Board { row: usize, along: f32, height: f32 },
+    /// A board from behind.
+    Back,
+    /// The wall in front of the first seats.
+    Barrier { along: f32, height: f32 },
+    /// A tier; `up` along its slope, `back` the share of its depth.
+    Seats { along: f32, up: f32, back: f32, from_behind: bool },
+    /// The front of an upper tier.
+    Fascia { along: f32, height: f32 },
+    /// A roof from below.
+    Roof,
+    /// The front of a roof.
+    RoofEdge,
+}
+
+/// Length of a painted board, metres.
+const BOARD_M: f32 = 7.5;
+/// How often the text of a shining row comes again, metres.
+const LED_M: f32 = 12.0;
+
 impl Stadium {
-    pub(crate) fn board(&self, along: f32, height: f32, sample: f32) -> Vec3 {
-        const WIDTH: f32 = 9.0;
-        let index = (along / WIDTH).floor();
-        let x = along - index * WIDTH;
-        let pick = (index as i32 + 1000).unsigned_abs() as usize;
-        let Some(board) = self.boards.get(pick % self.boards.len().max(1)) else { return Vec3::splat(0.1) };
-        let glyph = 0.38;
-        let width = lettering::width(&board.text) * glyph;
-        let place = Vec2::new((x - (WIDTH - width) / 2.0) / glyph, (0.78 - height) / glyph);
-        let ink = lettering::ink(&board.text, place, 0.26, sample / glyph);
-        let seam = if x < 0.06 { 0.6 } else { 1.0 };
-        linear(board.ground).lerp(linear(board.ink), ink) * seam
-    }
-
-    pub(crate) fn barrier(&self, along: f32, height: f32, sample: f32) -> Vec3 {
-        let rail = if (height - 1.25).abs() < 0.05 { 0.5 } else { 0.0 };
-        let post = if (along / 1.5).rem_euclid(1.0) < 0.08f32.max(sample / 3.0) { 0.25 } else { 0.0 };
-        Vec3::splat(0.05 + 0.12 * f32::max(rail, post)) * Vec3::new(0.95, 1.0, 1.1)
-    }
-
-    pub(crate) fn fascia(&self, along: f32, height: f32, sample: f32) -> Vec3 {
-        if !(2.0..3.4).contains(&height) {
-            return Vec3::new(0.020, 0.021, 0.025);
-        }
-        let text = "HOLOPITCH";
-        let place = Vec2::new(along.rem_euclid(24.0) / 0.5 - 4.0, (3.1 - height) / 0.5);
-        let ink = lettering::ink(text, place, 0.22, sample / 0.5);
-        linear([0.03, 0.07, 0.20]).lerp(linear([0.55, 0.75, 0.95]), ink) * 0.6
-    }
-
-    /// Rows of people; `along` and `up` in metres, averaged over a few points of the pixel.
-    pub(crate) fn seats(&self, along: f32, up: f32, sample: f32) -> Vec3 {
-        let mut sum = Vec3::ZERO;
-        const SIDE: i32 = 2;
-        for k in 0..SIDE * SIDE {
-            let dx = ((k % SIDE) as f32 + 0.5) / SIDE as f32 - 0.5;
-            let dy = ((k / SIDE) as f32 + 0.5) / SIDE as f32 - 0.5;
-            sum += self.seat(along + dx * sample, up + dy * sample * 1.3);
-        }
-        sum / (SIDE * SIDE) as f32
-    }
-
-    fn seat(&self, along: f32, up: f32) -> Vec3 {
-        const ROW: f32 = 0.86;
-        const PLACE: f32 = 0.56;
-        let block = (along / 17.0).floor();
-        let in_block = along - block * 17.0;
-        if in_block < 1.1 {
-            // Stairs between the blocks.
-            let step = (up / (ROW / 2.0)).rem_euclid(1.0);
-            return Vec3::splat(if step < 0.5 { 0.10 } else { 0.16 });
-        }
-        let row = (up / ROW).floor();
-        let v = up - row * ROW; // 0 at the feet
-        let lean = noise::unit(row as i32, block as i32, self.seed ^ 21) * PLACE;
-        let place = ((in_block + lean) / PLACE).floor();
-        let key = |salt: u32| noise::unit(place as i32 + block as i32 * 64, row as i32, self.seed ^ salt);
-        let u = in_block + lean - place * PLACE - PLACE / 2.0 + (key(31) - 0.5) * 0.14;
-        if key(32) > 0.93 {
-            return linear([0.16, 0.20, 0.34]) * if v > 0.45 { 0.35 } else { 0.7 }; // an empty seat
-        }
-        let tall = 0.92 + 0.16 * (key(33) - 0.5);
-        let shade = 0.75 + 0.5 * key(34);
-        let from_head = Vec2::new(u, v - tall * 0.80);
-        if from_head.length_squared() < 0.0125 {
-            // Hair and hats on top, a face below.
-            if from_head.y > 0.03 {
-                return Vec3::splat(0.02 + 0.10 * key(43).powi(4));
+    /// Light from a wall at a point; `sample` is the size of a pixel there, metres.
+    pub(crate) fn wall(&self, wall: &Wall, point: Vec3, sample: f32) -> Vec3 {
+        let day = self.lights.sky;
+        match *wall {
+            Wall::Board { row, along, height } => self.board(row, along, height, sample),
+            Wall::Back => Vec3::new(0.05, 0.05, 0.055) * (day + 0.3),
+            Wall::Barrier { along, height } => self.barrier(along, height, sample) * (0.4 + day),
+            Wall::Seats { along, up, back, from_behind } => {
+                let colour = self.around.crowd_colour(self, along, up, sample);
+                // Less light under the roof, and the sun where it gets in.
+                let deep = 1.0 - 0.45 * back;
+                let sun = if self.sunny { self.sun_at(point) } else { 0.0 };
+                let behind = if from_behind { 0.45 } else { 1.0 };
+                colour * (self.around.crowd.light * behind * (deep + 1.5 * sun))
             }
-            let tone = key(35).powi(2);
-            return linear([0.86 - 0.5 * tone, 0.68 - 0.45 * tone, 0.58 - 0.42 * tone]) * shade;
+            Wall::Fascia { along, height } => self.fascia(along, height, sample),
+            Wall::Roof => self.around.roof,
+            Wall::RoofEdge => self.around.structure * (day * 1.4 + 0.1),
         }
-        let shoulders = 0.25 - 1.6 * (v - tall * 0.56).max(0.0);
-        if u.abs() < shoulders && v > 0.10 {
-            let choice = key(36);
-            let coat: Srgb = if choice < 0.42 {
-                let grey = 0.10 + 0.18 * key(37);
-                [grey, grey, grey * 1.12]
-            } else if choice < 0.68 {
-                [0.30 + 0.42 * key(38), 0.30 + 0.42 * key(38), 0.34 + 0.42 * key(38)]
-            } else if choice < 0.86 && !self.crowd.is_empty() {
-                self.crowd[(key(39) * self.crowd.len() as f32) as usize % self.crowd.len()]
-            } else {
-                [0.1 + key(40) * 0.6, 0.1 + key(41) * 0.45, 0.1 + key(42) * 0.45]
-            };
-            let fold = 0.45 + 0.35 * (v - 0.10) / 0.6;
-            return linear(coat) * shade * fold;
+    }
+
+    fn board(&self, row: usize, along: f32, height: f32, sample: f32) -> Vec3 {
+        let boards = &self.around.boards;
+        let count = boards.len().max(1);
+        let [low, high] = self.around.sides[0].boards.get(row).map_or([0.0, 0.9], |row| row.high_m);
+        let led = self.around.sides[0].boards.get(row).is_some_and(|row| row.led);
+        let wide = if led { LED_M } else { BOARD_M };
+        let index = (along / wide).floor();
+        // A shining row shows one text all round; painted boards follow each other.
+        let pick = if led { self.seed as usize + row } else { (index as i64 + 100_000) as usize * (row + 1) };
+        let Some(board) = boards.get(pick % count) else { return Vec3::splat(0.1) };
+        let glyph = 0.46 * (high - low);
+        let width = lettering::width(&board.text) * glyph;
+        let x = along - index * wide - (wide - width) / 2.0;
+        let place = Vec2::new(x / glyph, (low + 0.87 * (high - low) - height) / glyph);
+        let ink = lettering::ink(&board.text, place, 0.36, sample / glyph);
+        let colour = board_colour(board, ink);
+        if led {
+            // Diodes: bright, a little blue, the same by day and night.
+            return colour * Vec3::new(0.78, 0.80, 0.86);
         }
-        Vec3::splat(0.022)
+        let seam = if along - index * wide < 0.06f32.max(sample * 0.7) { 0.6 } else { 1.0 };
+        let light = self.lights.sky + self.lights.lamps.iter().map(|lamp| lamp.1 * 0.5).sum::<Vec3>();
+        colour * light.min(Vec3::splat(1.1)) * (0.9 * seam)
+    }
+
+    fn barrier(&self, along: f32, height: f32, sample: f32) -> Vec3 {
+        let top = self.around.sides[0].barrier_m;
+        let rail = if (height - top + 0.1).abs() < 0.05 { 0.5 } else { 0.0 };
+        let post = if (along / 2.4).rem_euclid(1.0) < 0.03f32.max(sample / 5.0) { 0.15 } else { 0.0 };
+        self.around.structure * (0.25 + f32::max(rail, post) + 0.1 * (along * 0.3).sin().max(0.0))
+    }
+
+    fn fascia(&self, along: f32, height: f32, sample: f32) -> Vec3 {
+        if !(3.3..4.6).contains(&height) {
+            // The dark gangway under the tier, then its edge.
+            return if height > 4.6 { self.around.structure * 0.5 } else { Vec3::new(0.020, 0.021, 0.025) };
+        }
+        let Some(board) = self.around.boards.first() else { return Vec3::splat(0.05) };
+        let place = Vec2::new(along.rem_euclid(24.0) / 0.5 - 4.0, (4.35 - height) / 0.5);
+        let ink = lettering::ink(&board.text, place, 0.22, sample / 0.5);
+        board_colour(board, ink) * 0.55
+    }
+}
+
+fn board_colour(board: &Board, ink: f32) -> Vec3 {
+    linear(board.ground).lerp(linear(board.ink), ink)
+}
+
+impl crate::stadium::Surroundings {
+    fn crowd_colour(&self, stadium: &Stadium, along: f32, up: f32, sample: f32) -> Vec3 {
+        // The picture repeats every 61 m; slow brightness hides it.
+        let slow = crate::noise::value(Vec2::new(along * 0.07, up * 0.11), stadium.seed ^ 91);
+        stadium.crowd.colour(along, up, sample) * (1.0 + 0.12 * slow)
     }
 }

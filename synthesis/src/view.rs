@@ -2,13 +2,12 @@
 
 use glam::DVec2;
 use image::RgbImage;
-use protocol::camera::Camera;
+use protocol::{camera::Camera, pitch::Pitch};
 
 use crate::{
     SynthesisError,
     clip::{FRAME_RATE, render_frame},
     fixture::{Fixture, FixtureOptions},
-    operator::Tripod,
     trajectories::Trajectories,
 };
 
@@ -26,8 +25,9 @@ pub fn picture_from(camera: &Camera, seed: u64) -> Result<RgbImage, SynthesisErr
             frames: (LENGTH_S * f64::from(FRAME_RATE)) as usize,
             rate_hz: f64::from(FRAME_RATE),
             size_px: (camera.width_px, camera.height_px),
-            start_seconds: 0.0,
-            tripod: Tripod::default(),
+            // Real pitches are taken to have the usual size.
+            pitch: Some(Pitch::default()),
+            ..FixtureOptions::default()
         },
     )?;
     let middle = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px)) / 2.0;

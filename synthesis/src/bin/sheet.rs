@@ -16,13 +16,13 @@ use synthesis::{
     figure::Figure,
     motion::Motions,
     movement::{Habits, Movement},
-    paint::Lights,
     play::Event,
     render::{Actor, Scene, Window},
     rig,
     sensor::Sensor,
     stadium::Stadium,
     trajectories::{Path2, Role, Trajectories},
+    venue::Venue,
 };
 
 const USAGE: &str = "usage: sheet actions|kits --out DIR [--seed N] [--height PIXELS]
@@ -69,7 +69,7 @@ fn cell(
     let distance = eye.distance(at.as_dvec3());
     let camera =
         Camera::looking_at(size, f64::from(high) * distance / 1.8, eye, at.as_dvec3() + DVec3::Y * 0.85);
-    let scene = Scene { stadium, actors: vec![actor], solids: Vec::new() };
+    let scene = Scene { stadium, actors: vec![actor], solids: Vec::new(), nets: None };
     let window = Window { first: [0, 0], size: [size.0 as usize, size.1 as usize] };
     let light = scene.render(&camera, window, 3);
     Sensor::clean().expose(&light, &mut Pcg64Mcg::seed_from_u64(1))
@@ -95,7 +95,7 @@ fn actions(options: &Options) -> Result<(), SynthesisError> {
     let cast = Cast::new(&paths, RATE_HZ, &Pitch::default(), options.seed)?;
     let motions = Motions::shipped()?;
     BaseBody::load()?;
-    let stadium = Stadium::new(Pitch::default(), Vec::new(), Lights::floodlights(), 3);
+    let stadium = Venue::plain(3, Pitch::default(), [[0.9; 3], [0.1; 3]]).stadium;
     let gaits: [(&str, f32, f32); 8] = [
         ("stand", 0.0, 0.0),
         ("walk", 1.3, 0.0),
@@ -167,7 +167,7 @@ fn actions(options: &Options) -> Result<(), SynthesisError> {
 
 /// People of eight matches: two of each team, both goalkeepers and an official, from in front and behind.
 fn kits(options: &Options) -> Result<(), SynthesisError> {
-    let stadium = Stadium::new(Pitch::default(), Vec::new(), Lights::floodlights(), 3);
+    let stadium = Venue::plain(3, Pitch::default(), [[0.9; 3], [0.1; 3]]).stadium;
     let wide = options.height_px * 3 / 2;
     for seed in options.seed..options.seed + 8 {
         let paths = Trajectories::generated(seed, 2.0).resampled(0.5, 25.0, 3);

@@ -2,10 +2,10 @@
 
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
-use synthesis::{Options, synthesize};
+use synthesis::{Options, synthesize, venue::Setting};
 
 const USAGE: &str = "usage: synthesize --out DIR [--seed N] [--frames N] [--size WxH] [--trajectories FILE.json] [--start SECONDS]
-                  [--truth-triangles N] [--crf N] [--maps yes|no]
+                  [--truth-triangles N] [--crf N] [--maps yes|no] [--setting plain|drawn] [--shots LIST]
 
 example: cargo run -p synthesis --bin synthesize -- --out target/clip --seed 7 --frames 50";
 
@@ -26,7 +26,15 @@ fn options() -> Option<Options> {
             "--start" => options.start_seconds = value.parse().ok()?,
             "--truth-triangles" => options.truth_triangles = value.parse().ok()?,
             "--maps" => options.maps = value == "yes",
-            "--crf" => options.crf = value.parse().ok()?,
+            "--shots" => options.shots = value.parse().ok()?,
+            "--setting" => {
+                options.setting = match value.as_str() {
+                    "plain" => Setting::Plain,
+                    "drawn" => Setting::Drawn,
+                    _ => return None,
+                };
+            }
+            "--crf" => options.crf = Some(value.parse().ok()?),
             _ => return None,
         }
     }

@@ -1,6 +1,5 @@
 //! Who and what a shard draws from: dressed bodies and stadiums of one split.
 
-use glam::Vec3;
 use protocol::pitch::Pitch;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -10,9 +9,9 @@ use super::{DepthOptions, Split};
 use crate::{
     body::{BaseBody, Build},
     figure::{Detail, Figure, dress},
-    outfit::{Kit, Outfit, Srgb},
-    paint::Lights,
-    stadium::{Board, Stadium},
+    outfit::{Kit, Outfit},
+    stadium::Stadium,
+    venue::Venue,
 };
 
 /// Everything a shard draws from.
@@ -45,7 +44,8 @@ impl Cast {
         let stadiums = (0..12)
             .map(|k| {
                 let mut rng = rng(options.seed, &[8, shard as u64, k]);
-                random_stadium(&mut rng)
+                let supporters = [0; 2].map(|_| [0; 3].map(|_| rng.random_range(0.02..0.98f32)));
+                Venue::drawn(rng.random(), Pitch::default(), supporters).stadium
             })
             .collect();
         Self { figures, stadiums }
@@ -59,43 +59,6 @@ fn split_of(id: u32) -> Split {
         6 => Split::Validation,
         _ => Split::Train,
     }
-}
-
-fn random_stadium(rng: &mut Pcg64Mcg) -> Stadium {
-    const TEXTS: [&str; 8] = [
-        "HOLOPITCH",
-        "TABLETOP",
-        "NORTH BANK",
-        "OPEN GOAL",
-        "EXTRA TIME",
-        "FAIR PLAY",
-        "KICK OFF 20",
-        "LINESMAN",
-    ];
-    let mut colour = || -> Srgb { [0; 3].map(|_| rng.random_range(0.02..0.98f32)) };
-    let boards: Vec<Board> =
-        TEXTS.iter().map(|text| Board { text: (*text).into(), ground: colour(), ink: colour() }).collect();
-    let crowd = (0..4).map(|_| colour()).collect();
-    let lights = if rng.random_bool(0.45) {
-        Lights::floodlights()
-    } else {
-        let around = rng.random_range(0.0..std::f32::consts::TAU);
-        let high = rng.random_range(0.45..1.3f32);
-        Lights::sun(
-            Vec3::new(around.cos() * high.cos(), high.sin(), around.sin() * high.cos()),
-            rng.random_range(0.0..1.0),
-        )
-    };
-    let seed = rng.random();
-    let mut stadium = Stadium::new(Pitch::default(), boards, lights, seed);
-    let base = [[0.33, 0.47, 0.16], [0.28, 0.45, 0.20], [0.42, 0.50, 0.22], [0.22, 0.40, 0.17]];
-    let grass: [f32; 3] = base[rng.random_range(0..base.len())];
-    stadium.grass = grass.map(|c| c * rng.random_range(0.9..1.1f32));
-    stadium.mowing = rng.random_range(0.0..0.3);
-    stadium.crowd = crowd;
-    stadium.stands_light = rng.random_range(0.25..0.9);
-    stadium.apron = if rng.random_bool(0.5) { stadium.grass } else { [0.45, 0.25, 0.2] };
-    stadium
 }
 
 /// The generator of one thing: the seed and the way to it.

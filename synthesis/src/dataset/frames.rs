@@ -16,7 +16,6 @@ use crate::{
     SynthesisError,
     clip::{FRAME_RATE, render_frame},
     fixture::{Fixture, FixtureOptions},
-    operator::Tripod,
     trajectories::{Role, Trajectories},
     truth::{self, FrameTruth, PersonTruth, put},
 };
@@ -117,8 +116,7 @@ fn one_match(
             frames,
             rate_hz: f64::from(FRAME_RATE),
             size_px: options.size_px,
-            start_seconds: 0.0,
-            tripod: Tripod::default(),
+            ..FixtureOptions::default()
         },
     )?;
     let everybody = truth::people_truth(&fixture.members);

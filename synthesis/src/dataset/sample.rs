@@ -146,7 +146,7 @@ pub(super) fn draw(
         }
     }
     let joints = actors[0].posed.landmarks.clone();
-    let scene = Scene { stadium, actors, solids: Vec::new() };
+    let scene = Scene { stadium, actors, solids: Vec::new(), nets: None };
 
     // The crop: the box of the whole person, hidden parts too, made square and wide enough for the pose network.s look (1.5 times the box).
     let (mut least, mut most) = (DVec2::MAX, DVec2::MIN);
@@ -176,7 +176,7 @@ pub(super) fn draw(
     let grid = Grid { origin_px: corner.to_array(), per_px: 1.0 / scale, width: CROP, height: CROP };
     let hits = scene.first_hits(&camera, grid);
     let mask: Vec<u8> = hits.iter().map(|hit| if matches!(hit, Some((0, _))) { 255 } else { 0 }).collect();
-    let alone = Scene { stadium, actors: scene.actors[..1].to_vec(), solids: Vec::new() };
+    let alone = Scene { stadium, actors: scene.actors[..1].to_vec(), solids: Vec::new(), nets: None };
     let whole = if scene.actors.len() > 1 {
         alone.first_hits(&camera, grid).iter().flatten().count()
     } else {

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{
     SynthesisError,
     dataset::plane_depth,
-    raster::{self, Grid, NOTHING, Raster},
+    raster::{self, Grid, Raster},
     render::Actor,
 };
 
@@ -61,8 +61,9 @@ impl PersonMaps {
         let mut back = Raster::new(grid);
         back.draw(&vertices, triangles, 0);
         let depth = |raster: &Raster, inverse: &dyn Fn(f32) -> f32| {
-            let samples = raster.triangle.iter().zip(&raster.inverse_depth);
-            samples.map(|(&t, &value)| if t == NOTHING { 0.0 } else { 1.0 / inverse(value) }).collect()
+            let samples =
+                (0..tile.size[0] * tile.size[1]).map(|k| raster.at(k % tile.size[0], k / tile.size[0]));
+            samples.map(|hit| hit.map_or(0.0, |hit| 1.0 / inverse(hit.inverse_depth))).collect()
         };
         Self { tile, front_m: depth(&front, &|value| value), back_m: depth(&back, &|value| above - value) }
     }

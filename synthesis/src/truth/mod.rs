@@ -16,6 +16,7 @@ use crate::{
     props::BALL_RADIUS_M,
     raster::Grid,
     render::Scene,
+    shots::ShotTruth,
     trajectories::Role,
 };
 
@@ -67,7 +68,9 @@ pub struct PersonTruth {
 pub struct FrameTruth {
     /// Index in the clip.
     pub frame: usize,
-    /// The camera.
+    /// Which shot it is from, and what it is mixed with.
+    pub shot: ShotTruth,
+    /// The camera; of the picture that dominates when two are mixed.
     pub camera: Camera,
     /// The ball.
     pub ball: BallFrame,
@@ -189,7 +192,8 @@ pub fn measure(
     }
     let ball = ball(&camera, scene, fixture.ball[frame].as_dvec3());
     let pitch_points = lines::points_in_picture(&camera, &fixture.stadium.pitch);
-    (FrameTruth { frame, camera, ball, pitch_points, people }, maps)
+    let shot = fixture.film[frame].truth();
+    (FrameTruth { frame, shot, camera, ball, pitch_points, people }, maps)
 }
 
 /// The pixels of one person that nothing covers.

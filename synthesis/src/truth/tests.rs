@@ -8,8 +8,7 @@ use super::*;
 use crate::{
     dataset::plane_depth,
     fixture::FixtureOptions,
-    operator::Tripod,
-    raster::{self, NOTHING, Raster},
+    raster::{self, Raster},
     trajectories::Trajectories,
 };
 
@@ -23,7 +22,7 @@ fn measured() -> &'static (Fixture, FrameTruth, Maps) {
             rate_hz: 25.0,
             size_px: (640, 360),
             start_seconds: 0.5,
-            tripod: Tripod::default(),
+            ..FixtureOptions::default()
         };
         let fixture = Fixture::new(&Trajectories::generated(5, 2.0), &options).unwrap();
         let (truth, maps) = measure(&fixture, &fixture.scene(2), 2, true);
@@ -143,8 +142,9 @@ fn boxes_are_tight_within_a_pixel() {
         raster::project(&truth.camera, &grid, &actor.posed.positions, &mut projected);
         raster.draw(&projected, &actor.figure.triangles, 0);
         let (mut low, mut high) = (DVec2::MAX, DVec2::MIN);
-        for place in (0..raster.triangle.len()).filter(|&place| raster.triangle[place] != NOTHING) {
-            let at = DVec2::from(grid.pixel(place % grid.width, place / grid.width));
+        let samples = (0..grid.width * grid.height).map(|place| (place % grid.width, place / grid.width));
+        for (i, j) in samples.filter(|&(i, j)| raster.at(i, j).is_some()) {
+            let at = DVec2::from(grid.pixel(i, j));
             low = low.min(at);
             high = high.max(at);
         }
