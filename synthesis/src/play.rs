@@ -166,7 +166,7 @@ fn dives(
         let Some(j) = level else { continue };
         let aside = ball[j].z - people[who].xz[j].y;
         let from = flat(ball[k]) - people[who].xz[j];
-        if !(0.7..4.0).contains(&aside.abs()) || ball[j].z.abs() > 6.0 || ball[j].y > 2.9 {
+        if !(0.45..4.0).contains(&aside.abs()) || ball[j].z.abs() > 6.0 || ball[j].y > 2.9 {
             continue;
         }
         let facing = yaw_of(Vec2::new(-side, (from.y / from.length().max(1.0)) * 0.5));
