@@ -106,7 +106,8 @@ impl<'a> Nets<'a> {
         // The overlap of the pixel with the nearest cord.
         let (half, half_cord) = (sample / 2.0, self.look.cord_m / 2.0);
         let sharp = ((off + half).min(half_cord) - (off - half).max(-half_cord)).max(0.0) / sample;
-        let far = (sample / cell * 2.0 - 0.5).clamp(0.0, 1.0);
+        // Fewer than four pixels from cord to cord would beat with the grid of pixels.
+        let far = ((sample / cell - 0.12) / 0.13).clamp(0.0, 1.0);
         sharp + (mean - sharp) * far
     }
 }

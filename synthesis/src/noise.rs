@@ -25,7 +25,7 @@ pub fn unit(x: i32, y: i32, seed: u32) -> f32 {
 #[inline]
 fn whole(value: f32) -> i32 {
     let cut = value as i32;
-    cut - i32::from(cut as f32 > value)
+    cut.wrapping_sub(i32::from(cut as f32 > value))
 }
 
 /// Smooth noise −1..1 with features of size 1.

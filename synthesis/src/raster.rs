@@ -109,13 +109,13 @@ pub fn project_moving(
 /// The least whole number that is not below; `ceil` is a call on processors without a rounding instruction.
 fn above(value: f32) -> i32 {
     let cut = value as i32;
-    cut + i32::from((cut as f32) < value)
+    cut.saturating_add(i32::from((cut as f32) < value))
 }
 
 /// The greatest whole number that is not above.
 fn below(value: f32) -> i32 {
     let cut = value as i32;
-    cut - i32::from(cut as f32 > value)
+    cut.saturating_sub(i32::from(cut as f32 > value))
 }
 
 impl Raster {
@@ -239,6 +239,14 @@ mod tests {
             }
         }
         assert!(hits > 5_000, "{hits} samples");
+    }
+
+    #[test]
+    fn rounding_agrees_with_the_library_and_survives_any_number() {
+        for value in [-2.5f32, -2.0, -0.1, 0.0, 0.1, 1.0, 7.9] {
+            assert_eq!((above(value), below(value)), (value.ceil() as i32, value.floor() as i32), "{value}");
+        }
+        assert_eq!((below(-1e30), above(1e30), below(f32::NAN)), (i32::MIN, i32::MAX, 0));
     }
 
     #[test]

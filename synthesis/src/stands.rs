@@ -64,11 +64,12 @@ impl Stadium {
         // A shining row shows one text all round; painted boards follow each other.
         let pick = if led { self.seed as usize + row } else { (index as i64 + 100_000) as usize * (row + 1) };
         let Some(board) = boards.get(pick % count) else { return Vec3::splat(0.1) };
-        let glyph = 0.46 * (high - low);
+        let glyph = (0.46 * (high - low)).min((wide - 0.5) / lettering::width(&board.text).max(1.0));
         let width = lettering::width(&board.text) * glyph;
         let x = along - index * wide - (wide - width) / 2.0;
-        let place = Vec2::new(x / glyph, (low + 0.87 * (high - low) - height) / glyph);
-        let ink = lettering::ink(&board.text, place, 0.36, sample / glyph);
+        let top = (low + high + glyph * lettering::HEIGHT) / 2.0;
+        let place = Vec2::new(x / glyph, (top - height) / glyph);
+        let ink = lettering::ink(&board.text, place, 0.32, sample / glyph);
         let colour = board_colour(board, ink);
         if led {
             // Diodes: bright, a little blue, the same by day and night.
