@@ -26,7 +26,7 @@ pub(crate) enum Command {
     Calibrate(Calibrate),
     /// Render a broadcast clip of a match together with its ground truth.
     #[command(
-        after_help = "Example:\n  reconstructor synthesize --out demo --seed 7 --frames 100 --size 1280x720"
+        after_help = "Examples:\n  reconstructor synthesize --out demo --seed 7 --frames 100 --size 1280x720\n  reconstructor synthesize --out mine --frames 1500 --maps --camera 0,22,70 --player-px 60 --size 1920x1080\n  reconstructor synthesize --out cuts --frames 300 --shots main:150~0,close-up:50~8,main"
     )]
     Synthesize(Synthesize),
     /// Measure results against ground truth.
@@ -97,9 +97,30 @@ pub(crate) struct Synthesize {
     /// Width and height of the picture in pixels, even numbers.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = size)]
     pub(crate) size: (u32, u32),
-    /// Recorded paths of players and ball; made up when not given.
+    /// Recorded paths of players and ball (form: assets/demo/README.md); made up when not given.
     #[arg(long, value_name = "FILE")]
     pub(crate) trajectories: Option<PathBuf>,
+    /// Where in the recording the clip starts, seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    pub(crate) start: f64,
+    /// Cameras on air: KIND:FRAMES~DISSOLVE, …; kinds are main, high-behind and close-up.
+    #[arg(long, value_name = "SHOTS", default_value = "main")]
+    pub(crate) shots: synthesis::shots::Shots,
+    /// Where your main camera stands: metres along the touchline from the halfway line, up, and towards it from the centre mark.
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    pub(crate) camera: Option<[f64; 3]>,
+    /// How high that camera shows a player in the middle of the picture.
+    #[arg(long, value_name = "PIXELS", requires = "camera")]
+    pub(crate) player_px: Option<f64>,
+    /// Ground, light, camera and broadcast chain: all drawn from the seed, or one plain evening ground.
+    #[arg(long, value_name = "drawn|plain", default_value = "drawn")]
+    pub(crate) setting: synthesis::venue::Setting,
+    /// Quality of the H.264 file, x264's CRF 0..51; a broadcaster's bitrate drawn from the seed when not given.
+    #[arg(long, value_name = "CRF", value_parser = clap::value_parser!(u8).range(0..=51))]
+    pub(crate) crf: Option<u8>,
+    /// Triangles of each true surface, about.
+    #[arg(long, value_name = "N", default_value_t = 1_500, value_parser = clap::value_parser!(u32).range(50..=100_000))]
+    pub(crate) truth_triangles: u32,
     /// Also write every frame's maps: people, lines, first and last surfaces (PNG).
     #[arg(long)]
     pub(crate) maps: bool,
@@ -189,6 +210,15 @@ pub(crate) struct Serve {
     /// Address and port.
     #[arg(long, value_name = "ADDR", default_value = reconstructor::serve::DEFAULT_ADDRESS)]
     pub(crate) listen: SocketAddr,
+}
+
+/// `X,Y,Z` in metres.
+fn place(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|word| word.trim().parse().ok()).collect();
+    <[f64; 3]>::try_from(numbers)
+        .ok()
+        .filter(|place| text.split(',').count() == 3 && place.iter().all(|v| v.is_finite()))
+        .ok_or_else(|| format!("`{text}` is no place; write it in metres as 0,22,70"))
 }
 
 /// `A..B` as a range of frames that is not empty.

@@ -138,15 +138,25 @@ fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
 }
 
 fn run_synthesize(arguments: cli::Synthesize) -> Result<()> {
+    let platform = arguments.camera.map(|position_m| synthesis::operator::Platform {
+        position_m: position_m.into(),
+        player_px: arguments.player_px,
+    });
     let options = synthesis::Options {
         out: arguments.out,
         seed: arguments.seed,
         frames: arguments.frames,
         size_px: arguments.size,
         trajectories: arguments.trajectories,
+        start_seconds: arguments.start,
+        truth_triangles: arguments.truth_triangles,
         maps: arguments.maps,
-        ..synthesis::Options::default()
+        crf: arguments.crf,
+        setting: arguments.setting,
+        shots: arguments.shots,
+        platform,
     };
+    let start = std::time::Instant::now();
     let progress = Progress::new("synthesis", u64::from(options.frames));
     // The callback gets the number of finished frames.
     let made = synthesis::synthesize(&options, |done| {
@@ -157,10 +167,13 @@ fn run_synthesize(arguments: cli::Synthesize) -> Result<()> {
         tracing::warn!("no --trajectories given: the players run on made-up paths");
     }
     println!(
-        "{}: {} frames, {:.1} people in view per frame",
+        "{}: {} frames, {:.1} people in view per frame; {:.2} frames/s; per frame {} bytes of video, {} of truth",
         made.clip.display(),
         made.frames,
-        made.people_in_view_mean
+        made.people_in_view_mean,
+        made.frames as f64 / start.elapsed().as_secs_f64(),
+        made.clip_bytes / made.frames.max(1) as u64,
+        made.truth_bytes / made.frames.max(1) as u64
     );
     Ok(())
 }

@@ -13,6 +13,7 @@ use crate::{
     chain::Rate,
     correspondences::clicked,
     fixture::{Fixture, FixtureOptions},
+    operator::Platform,
     render::{Exposure, Window},
     shots::{self, Shots, Take},
     shutter::Shutter,
@@ -50,6 +51,8 @@ pub struct Options {
     pub setting: Setting,
     /// Which cameras are on air when.
     pub shots: Shots,
+    /// Where the main camera stands, instead of a place drawn from the seed.
+    pub platform: Option<Platform>,
 }
 
 impl Default for Options {
@@ -66,6 +69,7 @@ impl Default for Options {
             crf: None,
             setting: Setting::default(),
             shots: Shots::default(),
+            platform: None,
         }
     }
 }
@@ -81,6 +85,8 @@ pub struct Synthesized {
     pub frames: usize,
     /// People in view per frame, on average.
     pub people_in_view_mean: f64,
+    /// Bytes of the video.
+    pub clip_bytes: u64,
     /// Bytes of the truth, all files.
     pub truth_bytes: u64,
 }
@@ -141,6 +147,7 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
             setting: options.setting,
             pitch: options.trajectories.as_ref().map(|_| Pitch::default()),
             shots: options.shots.clone(),
+            platform: options.platform,
         },
     )?;
     std::fs::create_dir_all(&options.out).map_err(|source| SynthesisError::Io {
@@ -198,7 +205,11 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
     let text = serde_json::to_string_pretty(&points)
         .map_err(|error| SynthesisError::Options(format!("correspondences.json: {error}")))?;
     truth::put(&options.out.join("correspondences.json"), (text + "\n").as_bytes())?;
+    let clip_bytes = std::fs::metadata(&clip)
+        .map_err(|source| SynthesisError::Io { path: clip.clone(), doing: "read", source })?
+        .len();
     Ok(Synthesized {
+        clip_bytes,
         clip,
         generated_paths: options.trajectories.is_none(),
         frames: count,

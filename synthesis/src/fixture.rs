@@ -15,7 +15,7 @@ use crate::{
     chain::Chain,
     furniture,
     nets::NetLook,
-    operator::{Play, Tripod},
+    operator::{Platform, Play, Tripod},
     overlay::ScoreBoard,
     props,
     render::{Actor, Focus, Scene, Solid},
@@ -69,6 +69,8 @@ pub struct FixtureOptions {
     pub pitch: Option<Pitch>,
     /// Which cameras are on air when.
     pub shots: Shots,
+    /// Where the main camera stands, instead of a place drawn from the seed.
+    pub platform: Option<Platform>,
 }
 
 impl Default for FixtureOptions {
@@ -82,6 +84,7 @@ impl Default for FixtureOptions {
             setting: Setting::default(),
             pitch: None,
             shots: Shots::default(),
+            platform: None,
         }
     }
 }
@@ -115,10 +118,13 @@ impl Fixture {
         }
         let Cast { members, wardrobe } = Cast::new(&paths, rate, &pitch, options.seed)?;
         let colours = wardrobe.teams.each_ref().map(|kit| kit.shirt);
-        let Venue { stadium, tripod, net, style } = match options.setting {
+        let Venue { stadium, mut tripod, net, style } = match options.setting {
             Setting::Plain => Venue::plain(options.seed, pitch, colours),
             Setting::Drawn => Venue::drawn(options.seed, pitch, colours),
         };
+        if let Some(platform) = &options.platform {
+            tripod = platform.tripod(tripod, options.size_px)?;
+        }
         let play = Play {
             people: &paths.people,
             ball: &paths.ball,

@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use protocol::{camera::Camera, pitch::Pitch};
 
 use crate::{
+    SynthesisError,
     render::Focus,
     trajectories::{Path2, smooth},
 };
@@ -36,6 +37,31 @@ impl Default for Tripod {
             quickness: 4.5,
             k1: 0.0,
         }
+    }
+}
+
+/// A main camera as somebody has it: where it stands and how large it shows the players.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Platform {
+    /// World metres.
+    pub position_m: DVec3,
+    /// Wanted height of a player of 1.80 m in the middle of the picture, pixels; as the drawn ground has it when absent.
+    pub player_px: Option<f64>,
+}
+
+impl Platform {
+    /// `tripod` moved here.
+    pub fn tripod(&self, tripod: Tripod, size_px: (u32, u32)) -> Result<Tripod, SynthesisError> {
+        let Self { position_m, player_px } = *self;
+        let player_share = player_px.map_or(tripod.player_share, |px| px / f64::from(size_px.1));
+        let far = position_m.x.abs() <= 150.0 && position_m.z.abs() <= 150.0 && position_m.z.abs() >= 1.0;
+        if !(far && (1.0..=120.0).contains(&position_m.y) && (0.01..=0.6).contains(&player_share)) {
+            return Err(SynthesisError::Options(format!(
+                "a camera at {position_m} showing players {player_share:.3} of the picture high: it must stand within 150 m \
+                 of the centre mark, beside the halfway line's axis by at least 1 m, 1 to 120 m high, and show players 0.01 to 0.6 of the picture high"
+            )));
+        }
+        Ok(Tripod { position: position_m, player_share, ..tripod })
     }
 }
 

@@ -1,12 +1,15 @@
 //! Where a match is played, drawn from a seed: size of the pitch, turf, stands, boards, crowd, light, camera platform.
 //! What can be drawn follows real grounds and the laws of the game; the ranges are written where they are drawn.
 
+use std::str::FromStr;
+
 use glam::{DVec3, Vec3};
 use protocol::pitch::Pitch;
 use rand::{Rng, SeedableRng, seq::IndexedRandom};
 use rand_pcg::Pcg64Mcg;
 
 use crate::{
+    SynthesisError,
     crowd::CrowdLook,
     daylight::light,
     grounds::{TEXTS, sides, surroundings, turf},
@@ -27,6 +30,18 @@ pub enum Setting {
     /// Everything from the seed.
     #[default]
     Drawn,
+}
+
+impl FromStr for Setting {
+    type Err = SynthesisError;
+
+    fn from_str(text: &str) -> Result<Self, SynthesisError> {
+        match text {
+            "plain" => Ok(Self::Plain),
+            "drawn" => Ok(Self::Drawn),
+            _ => Err(SynthesisError::Options(format!("`{text}` is no setting: write plain or drawn"))),
+        }
+    }
 }
 
 /// A place to play and the platform it is filmed from.

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::{
     SynthesisError,
+    acts::Kind,
     fixture::{Fixture, Member},
     outfit::Srgb,
     props::BALL_RADIUS_M,
@@ -123,6 +124,10 @@ pub struct PersonFrame {
     pub anchor_m: [f64; 3],
     /// Height of the lowest point of the body above the ground, metres.
     pub above_ground_m: f64,
+    /// What the person does.
+    pub action: Kind,
+    /// Whether the left and the right foot bear on the ground.
+    pub contacts: [bool; 2],
     /// BlazePose's 33 landmarks, pixels.
     pub joints_px: Vec<[f64; 2]>,
     /// The same in world metres.
@@ -171,6 +176,7 @@ pub fn measure(
         // The person alone, in the part of its box that is in the picture.
         let own = PersonMaps::draw(&camera, actor, Tile::inside_picture(low, high, size));
         let seen = visible[id];
+        let step = &fixture.members[id].movement.steps[frame];
         let joints = &actor.posed.landmarks;
         let lowest = actor.posed.positions.iter().map(|p| p.y).fold(f32::MAX, f32::min);
         people.push(PersonFrame {
@@ -182,6 +188,8 @@ pub fn measure(
             in_view: box_inside >= 0.5,
             anchor_m: rounded(anchor.to_array(), 4),
             above_ground_m: rounded([f64::from(lowest)], 3)[0],
+            action: step.kind,
+            contacts: step.contacts,
             joints_px: joints
                 .iter()
                 .map(|j| rounded(camera.project(j.as_dvec3()).unwrap_or(DVec2::splat(-1e4)).to_array(), 1))
