@@ -12,8 +12,8 @@ use wgpu::{
 
 use crate::{
     ar::RoomPicture,
-    camera::ViewCamera,
-    renderer::{OnTable, RealTable, Renderer, Target},
+    camera::{EyeView, ViewCamera},
+    renderer::{Canvas, InRoom, OnTable, PictureFormat, RealTable, Renderer, Target},
     scene::{FrameScene, Stage},
 };
 
@@ -142,6 +142,23 @@ impl Offscreen {
         self.read_back(&target)
     }
 
+    /// What one eye of a headset is given, in the format of `in_room` with one view: sRGB premultiplied by alpha in linear
+    /// light, transparent where the room is seen.
+    pub fn picture_for_eye(
+        &self,
+        in_room: &InRoom,
+        format: PictureFormat,
+        eye: &EyeView,
+        (width_px, height_px): (u32, u32),
+    ) -> Result<RgbaImage, OffscreenError> {
+        let target = self.target(width_px, height_px)?;
+        let canvas = Canvas::of_layers(&self.device, &target.texture, 0, format, None);
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        in_room.draw(&self.queue, &mut encoder, &canvas, &[*eye]);
+        self.queue.submit([encoder.finish()]);
+        self.read_back(&target)
+    }
+
     /// Draws into `target` and waits until it is done.
     pub fn draw(
         &self,
@@ -161,7 +178,7 @@ impl Offscreen {
         polled.map(|_| ()).map_err(|error| OffscreenError::ReadBack(error.to_string()))
     }
 
-    /// The pixels of a target: sRGB, opaque.
+    /// The pixels of a target: sRGB.
     pub fn read_back(&self, target: &Target) -> Result<RgbaImage, OffscreenError> {
         read_layer(&self.device, &self.queue, &target.texture, 0)
     }

@@ -38,6 +38,12 @@ impl EyeView {
         clip_from_eye * eye_from_room
     }
 
+    /// The room as this eye sees it; metres are the room's.
+    #[must_use]
+    pub fn of_room(&self) -> View {
+        View { clip_from_world: self.clip_from_room().as_mat4(), eye_m: self.position_m.as_vec3() }
+    }
+
     /// The pitch as this eye sees it standing at `pose`.
     #[must_use]
     pub fn of_pitch(&self, pose: &TabletopPose) -> View {

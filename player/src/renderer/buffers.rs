@@ -1,5 +1,7 @@
 //! Vertices and indices on the GPU, kept and reused from frame to frame.
 
+use std::ops::Range;
+
 use bytemuck::Pod;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages, Device, IndexFormat, Queue, RenderPass};
 
@@ -66,10 +68,16 @@ impl Triangles {
     }
 
     pub(super) fn draw(&self, pass: &mut RenderPass<'_>) {
-        if self.count > 0 {
+        self.draw_part(pass, 0..self.count);
+    }
+
+    /// The triangles of some of the indices.
+    pub(super) fn draw_part(&self, pass: &mut RenderPass<'_>, part: Range<u32>) {
+        let part = part.start..part.end.min(self.count);
+        if !part.is_empty() {
             pass.set_vertex_buffer(0, self.vertices.buffer().slice(..));
             pass.set_index_buffer(self.indices.buffer().slice(..), IndexFormat::Uint32);
-            pass.draw_indexed(0..self.count, 0, 0..1);
+            pass.draw_indexed(part, 0, 0..1);
         }
     }
 }

@@ -5,22 +5,25 @@
 
 mod atlas;
 mod buffers;
+mod cast;
+mod in_room;
 mod pipelines;
 mod real_table;
 mod target;
 mod view;
 
+pub use in_room::{InRoom, Marks, RoomScene, Sight, Standing};
 pub use real_table::{OnTable, RealTable};
 pub use target::{Canvas, PictureFormat, Surroundings, Target};
 pub use view::View;
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages, Color,
-    CommandEncoder, Device, LoadOp, Operations, PipelineLayoutDescriptor, Queue, RenderPass,
-    RenderPassColorAttachment, RenderPassDepthStencilAttachment, RenderPassDescriptor, ShaderStages, StoreOp,
-    TextureFormat,
+    AddressMode, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
+    CommandEncoder, Device, FilterMode, LoadOp, Operations, PipelineLayoutDescriptor, Queue, RenderPass,
+    RenderPassColorAttachment, RenderPassDepthStencilAttachment, RenderPassDescriptor, Sampler,
+    SamplerDescriptor, ShaderStages, StoreOp, TextureFormat,
 };
 
 use crate::{
@@ -37,8 +40,6 @@ pub const COLOUR_FORMAT: TextureFormat = TextureFormat::Rgba8UnormSrgb;
 const DEPTH_FORMAT: TextureFormat = TextureFormat::Depth32Float;
 /// Samples per pixel.
 pub const SAMPLES: u32 = 4;
-/// The corners of the backdrop, linear light.
-const DARK: Color = Color { r: 0.022, g: 0.024, b: 0.029, a: 1.0 };
 /// Markings that fit the shader's array; a pitch has 27.
 const MOST_MARKINGS: usize = 60;
 
@@ -60,6 +61,7 @@ pub struct Renderer {
     format: PictureFormat,
     pipelines: Pipelines,
     view: Buffer,
+    stage: Buffer,
     scene_layout: BindGroupLayout,
     scene: BindGroup,
     atlas_layout: BindGroupLayout,
@@ -92,8 +94,8 @@ impl Renderer {
             })
         };
         let view = uniform("view", MOST_VIEWS * size_of::<ViewUniform>());
-        let sizes = uniform("stage", size_of::<StageUniform>());
-        queue.write_buffer(&sizes, 0, bytemuck::bytes_of(&stage_uniform(stage)));
+        let stage_sizes = uniform("stage", size_of::<StageUniform>());
+        queue.write_buffer(&stage_sizes, 0, bytemuck::bytes_of(&stage_uniform(stage)));
 
         let uniform_entry = |binding| BindGroupLayoutEntry {
             binding,
@@ -114,7 +116,7 @@ impl Renderer {
             layout: &scene_layout,
             entries: &[
                 BindGroupEntry { binding: 0, resource: view.as_entire_binding() },
-                BindGroupEntry { binding: 1, resource: sizes.as_entire_binding() },
+                BindGroupEntry { binding: 1, resource: stage_sizes.as_entire_binding() },
             ],
         });
         let atlas_layout = atlas::layout(device);
@@ -141,6 +143,7 @@ impl Renderer {
             format,
             pipelines,
             view,
+            stage: stage_sizes,
             scene_layout,
             scene,
             atlas: AtlasTexture::white(device, queue, &atlas_layout),
@@ -180,19 +183,26 @@ impl Renderer {
         queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&uniform));
 
         let backdrop = self.format.surroundings == Surroundings::Backdrop;
-        let clear = match self.format.surroundings {
-            Surroundings::Backdrop => Color::BLACK,
-            Surroundings::Dark => DARK,
-            Surroundings::Transparent => Color::TRANSPARENT,
-        };
+        let mut pass = self.begin(encoder, canvas);
+        pass.set_bind_group(0, &self.scene, &[]);
+        if backdrop {
+            pass.set_pipeline(&self.pipelines.backdrop);
+            pass.draw(0..3, 0..1);
+        }
+        self.draw_ground(&mut pass);
+        self.draw_upright(&mut pass);
+    }
+
+    /// A pass into an empty canvas.
+    fn begin<'a>(&self, encoder: &'a mut CommandEncoder, canvas: &Canvas) -> RenderPass<'a> {
         let store = if canvas.resolved.is_some() { StoreOp::Discard } else { StoreOp::Store };
-        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+        encoder.begin_render_pass(&RenderPassDescriptor {
             label: Some("table"),
             color_attachments: &[Some(RenderPassColorAttachment {
                 view: &canvas.colour,
                 depth_slice: None,
                 resolve_target: canvas.resolved.as_ref(),
-                ops: Operations { load: LoadOp::Clear(clear), store },
+                ops: Operations { load: LoadOp::Clear(self.format.surroundings.empty()), store },
             })],
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
                 view: &canvas.depth,
@@ -203,14 +213,7 @@ impl Renderer {
             timestamp_writes: None,
             occlusion_query_set: None,
             multiview_mask: multiview_mask(self.format.views),
-        });
-        pass.set_bind_group(0, &self.scene, &[]);
-        if backdrop {
-            pass.set_pipeline(&self.pipelines.backdrop);
-            pass.draw(0..3, 0..1);
-        }
-        self.draw_ground(&mut pass);
-        self.draw_upright(&mut pass);
+        })
     }
 
     /// What lies: turf, table and contact shadows. The scene's bind group must be set.
@@ -254,4 +257,16 @@ fn stage_uniform(stage: &Stage) -> StageUniform {
         padding: [0; 3],
         markings,
     }
+}
+
+/// Samples a picture between its pixels; outside it the border goes on.
+fn linear_sampler(device: &Device, label: &str) -> Sampler {
+    device.create_sampler(&SamplerDescriptor {
+        label: Some(label),
+        address_mode_u: AddressMode::ClampToEdge,
+        address_mode_v: AddressMode::ClampToEdge,
+        mag_filter: FilterMode::Linear,
+        min_filter: FilterMode::Linear,
+        ..Default::default()
+    })
 }

@@ -3,10 +3,10 @@
 use std::num::NonZeroU32;
 
 use wgpu::{
-    BlendState, ColorTargetState, ColorWrites, CompareFunction, DepthStencilState, Device, FragmentState,
-    MultisampleState, PipelineLayout, PrimitiveState, PrimitiveTopology, RenderPipeline,
-    RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, VertexAttribute, VertexBufferLayout,
-    VertexState, VertexStepMode, vertex_attr_array,
+    BlendComponent, BlendFactor, BlendOperation, BlendState, ColorTargetState, ColorWrites, CompareFunction,
+    DepthStencilState, Device, FragmentState, MultisampleState, PipelineLayout, PrimitiveState,
+    PrimitiveTopology, RenderPipeline, RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource,
+    VertexAttribute, VertexBufferLayout, VertexState, VertexStepMode, vertex_attr_array,
 };
 
 use super::{DEPTH_FORMAT, PictureFormat, view::for_two_views};
@@ -37,7 +37,19 @@ pub(super) enum Mixing {
     TransparentWithDepth,
     /// Leaves its depth and no colour.
     DepthOnly,
+    /// Over everything: the blend constant is the share of the picture that stays.
+    Fade,
 }
+
+/// The picture times the blend constant, and what is drawn times the rest.
+const FADING: BlendState = {
+    let component = BlendComponent {
+        src_factor: BlendFactor::OneMinusConstant,
+        dst_factor: BlendFactor::Constant,
+        operation: BlendOperation::Add,
+    };
+    BlendState { color: component, alpha: component }
+};
 
 pub(super) struct Kind<'a> {
     pub(super) name: &'a str,
@@ -169,10 +181,13 @@ pub(super) fn build(
         primitive: PrimitiveState { topology: kind.topology, cull_mode: None, ..Default::default() },
         depth_stencil: Some(DepthStencilState {
             format: DEPTH_FORMAT,
-            depth_write_enabled: Some(!matches!(kind.mixing, Mixing::Background | Mixing::Transparent)),
+            depth_write_enabled: Some(!matches!(
+                kind.mixing,
+                Mixing::Background | Mixing::Transparent | Mixing::Fade
+            )),
             // Reversed depth: nearer is larger.
             depth_compare: Some(match kind.mixing {
-                Mixing::Background => CompareFunction::Always,
+                Mixing::Background | Mixing::Fade => CompareFunction::Always,
                 _ => CompareFunction::GreaterEqual,
             }),
             stencil: Default::default(),
@@ -185,8 +200,11 @@ pub(super) fn build(
             compilation_options: Default::default(),
             targets: &[Some(ColorTargetState {
                 format: format.colour,
-                blend: matches!(kind.mixing, Mixing::Transparent | Mixing::TransparentWithDepth)
-                    .then_some(BlendState::ALPHA_BLENDING),
+                blend: match kind.mixing {
+                    Mixing::Transparent | Mixing::TransparentWithDepth => Some(BlendState::ALPHA_BLENDING),
+                    Mixing::Fade => Some(FADING),
+                    Mixing::Background | Mixing::Opaque | Mixing::DepthOnly => None,
+                },
                 write_mask: if kind.mixing == Mixing::DepthOnly {
                     ColorWrites::empty()
                 } else {

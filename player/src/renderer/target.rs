@@ -1,7 +1,7 @@
 //! What is drawn into: a multisampled picture and depth, resolved into a texture that can be shown or read back.
 
 use wgpu::{
-    Device, Extent3d, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
+    Color, Device, Extent3d, Texture, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages,
     TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
@@ -38,6 +38,18 @@ pub enum Surroundings {
     Dark,
     /// Nothing: the picture is transparent there. Colours are premultiplied by alpha.
     Transparent,
+}
+
+impl Surroundings {
+    /// What an empty picture is cleared to, linear light. The backdrop is drawn, not cleared.
+    pub(super) fn empty(self) -> Color {
+        match self {
+            Self::Backdrop => Color::BLACK,
+            // The corners of the backdrop.
+            Self::Dark => Color { r: 0.022, g: 0.024, b: 0.029, a: 1.0 },
+            Self::Transparent => Color::TRANSPARENT,
+        }
+    }
 }
 
 /// The attachments of a pass: everything a renderer needs to draw a picture, whoever owns the picture.

@@ -27,8 +27,9 @@ use super::{
     run::{Show, XrOptions},
 };
 use crate::{
+    camera::EyeView,
     placement::PlaneSource,
-    renderer::{PictureFormat, View},
+    renderer::{PictureFormat, Sight},
     scene::Stage,
 };
 
@@ -63,7 +64,7 @@ pub(super) struct Connection {
     pub(super) headset: Headset,
     pub(super) life: Lifecycle,
     pub(super) uploaded: bool,
-    pub(super) last_views: Option<[View; 2]>,
+    pub(super) last_eyes: Option<[EyeView; 2]>,
     /// The runtime's time that is the zero of the match's clock, nanoseconds.
     pub(super) clock_zero_ns: Option<i64>,
     leaving: bool,
@@ -84,6 +85,9 @@ impl Connection {
             headset.mixing.camera_layer.then(|| CameraPicture::start(&session)).transpose()?;
         if planes.is_none() {
             tracing::warn!("{} detects no planes: the match can only float", headset.runtime);
+        }
+        if headset.mixing.sight() == Sight::RoomPlusLight {
+            tracing::warn!("{} adds light to the room: no shadow falls on the real table", headset.runtime);
         }
         let figures = &mut show.figures;
         figures.runtime.clone_from(&headset.runtime);
@@ -112,7 +116,7 @@ impl Connection {
             headset,
             life: Lifecycle::default(),
             uploaded: false,
-            last_views: None,
+            last_eyes: None,
             clock_zero_ns: None,
             leaving: false,
         })
@@ -212,9 +216,14 @@ impl Connection {
         &self.graphics
     }
 
-    /// The views of the last frame.
-    pub(super) fn last_views(&self) -> Option<[View; 2]> {
-        self.last_views
+    /// The eyes of the last frame.
+    pub(super) fn last_eyes(&self) -> Option<[EyeView; 2]> {
+        self.last_eyes
+    }
+
+    /// What the user sees beside the pictures.
+    pub(super) fn sight(&self) -> Sight {
+        self.headset.mixing.sight()
     }
 
     pub(super) fn format(&self) -> PictureFormat {

@@ -16,7 +16,8 @@ use super::{
     run::Show,
 };
 use crate::{
-    renderer::{Canvas, PictureFormat, Renderer, View},
+    camera::EyeView,
+    renderer::{Canvas, InRoom, PictureFormat, RoomScene},
     scene::{FrameScene, Stage},
 };
 
@@ -38,7 +39,7 @@ pub struct Cost {
 
 /// Everything drawn in one way.
 struct Way {
-    renderer: Renderer,
+    in_room: InRoom,
     canvases: Vec<Canvas>,
     views: usize,
     with_upload: Vec<f64>,
@@ -46,7 +47,8 @@ struct Way {
 }
 
 impl Way {
-    fn new(device: &Device, queue: &Queue, stage: &Stage, format: PictureFormat, eyes: u32) -> Self {
+    fn new(connection: &Connection, show: &Show, stage: &Stage, format: PictureFormat, eyes: u32) -> Self {
+        let (device, queue) = (&connection.graphics().device, &connection.graphics().queue);
         let picture = device.create_texture(&TextureDescriptor {
             label: Some("cost"),
             size: Extent3d { width: SIDE_PX, height: SIDE_PX, depth_or_array_layers: eyes },
@@ -58,8 +60,10 @@ impl Way {
             view_formats: &[],
         });
         let canvas = |layer| Canvas::of_layers(device, &picture, layer, format, None);
+        let mut in_room = InRoom::new(device, queue, stage, format, connection.sight());
+        in_room.know(device, queue, show.table.surfaces());
         Self {
-            renderer: Renderer::with_format(device, queue, stage, format),
+            in_room,
             canvases: (0..eyes).step_by(format.views as usize).map(canvas).collect(),
             views: format.views as usize,
             with_upload: Vec::new(),
@@ -67,13 +71,21 @@ impl Way {
         }
     }
 
-    fn measure(&mut self, device: &Device, queue: &Queue, scene: &FrameScene, views: &[View; 2]) {
+    fn measure(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &FrameScene,
+        scene: &RoomScene<'_>,
+        eyes: &[EyeView; 2],
+    ) {
         let begun = thread_cpu_time();
-        self.renderer.upload(device, queue, scene);
+        self.in_room.upload(device, queue, frame);
         let uploaded = thread_cpu_time();
-        for (canvas, views) in self.canvases.iter().zip(views.chunks(self.views)) {
+        self.in_room.prepare(device, queue, scene);
+        for (canvas, eyes) in self.canvases.iter().zip(eyes.chunks(self.views)) {
             let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
-            self.renderer.draw_views(queue, &mut encoder, canvas, views);
+            self.in_room.draw(queue, &mut encoder, canvas, eyes);
             queue.submit([encoder.finish()]);
         }
         let done = thread_cpu_time();
@@ -86,16 +98,17 @@ impl Way {
 
 /// Compares both ways with the frame on show; `None` without one.
 pub(super) fn compare(connection: &Connection, show: &Show) -> Result<Option<Cost>, XrError> {
-    let (Some(shown), Some(views)) = (show.player.shown(), connection.last_views()) else { return Ok(None) };
+    let (Some(shown), Some(eyes)) = (show.player.shown(), connection.last_eyes()) else { return Ok(None) };
     let (device, queue) = (&connection.graphics().device, &connection.graphics().queue);
     let stereo_format = connection.format();
     let mono_format = PictureFormat { views: 1, ..stereo_format };
     let stage = connection.stage(show);
-    let mut mono = Way::new(device, queue, &stage, mono_format, 1);
-    let mut stereo = Way::new(device, queue, &stage, stereo_format, 2);
+    let mut mono = Way::new(connection, show, &stage, mono_format, 1);
+    let mut stereo = Way::new(connection, show, &stage, stereo_format, 2);
+    let scene = show.table.scene(&show.follow);
     for _ in 0..ROUNDS {
-        mono.measure(device, queue, &shown.scene, &views);
-        stereo.measure(device, queue, &shown.scene, &views);
+        mono.measure(device, queue, &shown.scene, &scene, &eyes);
+        stereo.measure(device, queue, &shown.scene, &scene, &eyes);
     }
     let of = |values: &[f64]| Spread::of(values.iter().copied());
     let (mono_cpu, stereo_cpu) = (of(&mono.with_upload), of(&stereo.with_upload));

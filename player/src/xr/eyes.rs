@@ -9,10 +9,11 @@ use openxr::{
 };
 use wgpu::{CommandEncoderDescriptor, Texture, TextureFormat, TextureTransition, TextureUses};
 
-use super::{XrError, ffi::graphics::Graphics};
+use super::{XrError, ffi::graphics::Graphics, table::Table};
 use crate::{
+    camera::EyeView,
     offscreen::read_layer,
-    renderer::{Canvas, PictureFormat, Renderer, Surroundings, View},
+    renderer::{Canvas, InRoom, PictureFormat, RoomScene, Sight, Surroundings},
     scene::{FrameScene, Stage},
 };
 
@@ -85,7 +86,9 @@ impl Images {
 pub(super) struct Eyes {
     /// Per image of the swapchain: one canvas of two layers, or two of one.
     canvases: Vec<Vec<Canvas>>,
-    renderer: Renderer,
+    in_room: InRoom,
+    /// The table's revision of the surfaces that are known to the renderer.
+    room: Option<u32>,
     pub(super) images: Images,
     pub(super) format: PictureFormat,
 }
@@ -97,7 +100,7 @@ impl Eyes {
         stage: &Stage,
         size_px: (u32, u32),
         samples: u32,
-        surroundings: Surroundings,
+        (surroundings, sight): (Surroundings, Sight),
     ) -> Result<Self, XrError> {
         let images = Images::new(graphics, session, size_px, 2)?;
         let views = graphics.views_per_pass(samples);
@@ -112,21 +115,34 @@ impl Eyes {
             let of_image = (0..2).step_by(views as usize).map(of_layer).collect();
             canvases.push(of_image);
         }
-        let renderer = Renderer::with_format(&graphics.device, &graphics.queue, stage, format);
-        Ok(Self { canvases, renderer, images, format })
+        let in_room = InRoom::new(&graphics.device, &graphics.queue, stage, format, sight);
+        Ok(Self { canvases, in_room, room: None, images, format })
     }
 
     /// Puts another frame of the match on the stage.
     pub(super) fn upload(&mut self, graphics: &Graphics, frame: &FrameScene) {
-        self.renderer.upload(&graphics.device, &graphics.queue, frame);
+        self.in_room.upload(&graphics.device, &graphics.queue, frame);
     }
 
     /// Draws both eyes into an image of the swapchain.
-    pub(super) fn draw(&self, graphics: &Graphics, image: usize, views: &[View; 2]) -> Result<(), XrError> {
+    pub(super) fn draw(
+        &mut self,
+        graphics: &Graphics,
+        image: usize,
+        table: &Table,
+        scene: &RoomScene<'_>,
+        eyes: &[EyeView; 2],
+    ) -> Result<(), XrError> {
+        let (device, queue) = (&graphics.device, &graphics.queue);
+        if self.room != Some(table.revision()) {
+            self.in_room.know(device, queue, table.surfaces());
+            self.room = Some(table.revision());
+        }
+        self.in_room.prepare(device, queue, scene);
         let canvases = self.canvases.get(image).ok_or_else(no_such_image)?;
-        for (canvas, views) in canvases.iter().zip(views.chunks(self.format.views as usize)) {
+        for (canvas, eyes) in canvases.iter().zip(eyes.chunks(self.format.views as usize)) {
             let mut encoder = graphics.device.create_command_encoder(&CommandEncoderDescriptor::default());
-            self.renderer.draw_views(&graphics.queue, &mut encoder, canvas, views);
+            self.in_room.draw(&graphics.queue, &mut encoder, canvas, eyes);
             graphics.queue.submit([encoder.finish()]);
         }
         Ok(())

@@ -31,6 +31,12 @@ impl Follow {
         }
     }
 
+    /// How far a match at `pose` is slid in the room, metres.
+    #[must_use]
+    pub fn slide_m(&self, pose: &TabletopPose) -> DVec3 {
+        self.applied(pose).position_m - pose.position_m
+    }
+
     /// A pose with the followed point where the centre mark was.
     #[must_use]
     pub fn applied(&self, pose: &TabletopPose) -> TabletopPose {

@@ -28,6 +28,7 @@ use super::{
     panel::{PanelPointer, PanelPose},
     room,
     run::{Show, XrOptions},
+    table::Table,
 };
 use crate::{placement::PlaneSource, session::Session};
 
@@ -96,14 +97,13 @@ impl Connection {
         watch.in_runtime += began.elapsed();
         self.interact(show, hands, head, changed, now, &mut watch)?;
 
-        let standing = show.follow.applied(&show.table.pose());
-        let views = [0, 1].map(|eye| room::eye(&located[eye]).of_pitch(&standing));
-        self.last_views = Some(views);
+        let looking = [0, 1].map(|eye| room::eye(&located[eye]));
+        self.last_eyes = Some(looking);
         let Some(eyes) = &mut self.eyes else { return Ok(()) };
         let image = watch.runtime(|| eyes.images.swapchain.acquire_image())? as usize;
         watch.runtime(|| eyes.images.swapchain.wait_image(openxr::Duration::from_nanos(IMAGE_TIMEOUT_NS)))?;
-        eyes.draw(&self.graphics, image, &views)?;
-        let on_show = shows_the_match(&show.player, options);
+        eyes.draw(&self.graphics, image, &show.table, &show.table.scene(&show.follow), &looking)?;
+        let on_show = shows_the_match(&show.player, options) && is_still(&show.table, options);
         let last = options.exit_after_frames.is_some_and(|wanted| show.records.len() + 1 >= wanted as usize);
         if let (true, true, Some(folder)) = (last, on_show, &options.capture) {
             let began = Instant::now();
@@ -182,9 +182,9 @@ impl Connection {
             let (recommended, most) = (self.headset.recommended_px, self.headset.most_px);
             let size = (scaled(recommended.0, most.0), scaled(recommended.1, most.1));
             (show.figures.width_px, show.figures.height_px) = size;
-            let surroundings = self.headset.mixing.surroundings;
+            let around = (self.headset.mixing.surroundings, self.sight());
             let stage = self.stage(show);
-            let eyes = Eyes::new(&self.graphics, &self.session, &stage, size, options.samples, surroundings)?;
+            let eyes = Eyes::new(&self.graphics, &self.session, &stage, size, options.samples, around)?;
             self.eyes = Some(eyes);
         }
         if let (Some(eyes), Some(shown), true) =
@@ -232,17 +232,26 @@ impl Connection {
         let panel_pose = PanelPose::beside(&pose, show.half_turf_m(), head.0, show.panel_pose);
         show.panel_pose = Some(panel_pose);
         let at = hands.map(|hand| hand.ray.and_then(|(origin, direction)| panel_pose.hit(origin, direction)));
-        show.table.follow(head, hands, at.map(|at| at.is_some()), now);
+        let slide_m = show.follow.slide_m(&pose);
+        show.table.follow(head, hands, at.map(|at| at.is_some()), slide_m, now);
         // The right hand first: two rays on one panel are one too many.
         let pointer = [1, 0]
             .into_iter()
             .find_map(|hand| at[hand].map(|at| PanelPointer { at: Some(at), pressed: hands[hand].select }))
             .unwrap_or_default();
-        show.follow.advance(show.player.shown().and_then(|shown| follow::ball(&shown.scene)), now);
-        let stale = changed || pointer != show.pointer || show.panel_stale;
-        show.pointer = pointer;
+        // While a place is chosen the whole pitch is shown there.
+        let middle_m = if show.table.is_placed() {
+            show.player.shown().and_then(|shown| follow::ball(&shown.scene))
+        } else {
+            Some(DVec3::ZERO)
+        };
+        show.follow.advance(middle_m, now);
+        let hint = show.table.hint();
+        let stale = changed || pointer != show.pointer || hint != show.hint || show.panel_stale;
+        (show.pointer, show.hint) = (pointer, hint);
         if stale {
-            let output = show.panel.run(&mut show.player, &mut show.follow.on, pointer, now);
+            let output =
+                show.panel.run(&mut show.player, &mut show.follow.on, show.hint.as_deref(), pointer, now);
             let in_runtime = self.panel.draw(&self.graphics, &show.panel, output)?;
             watch.in_runtime += in_runtime;
             show.panel_stale = false;
@@ -259,6 +268,11 @@ fn shows_the_match(player: &Session, options: &XrOptions) -> bool {
         }
         (shown, _) => shown.is_some(),
     }
+}
+
+/// Whether a picture can be taken: a match that a script has placed fades in first.
+fn is_still(table: &Table, options: &XrOptions) -> bool {
+    options.frame.is_none() || !table.is_placed() || table.is_settled()
 }
 
 fn save(folder: &Path, [left, right]: &[image::RgbaImage; 2]) -> Result<(), XrError> {

@@ -8,7 +8,7 @@ use openxr::{
 };
 
 use super::{XrError, ffi};
-use crate::renderer::Surroundings;
+use crate::renderer::{Sight, Surroundings};
 
 /// Two eyes.
 pub(super) const VIEWS: ViewConfigurationType = ViewConfigurationType::PRIMARY_STEREO;
@@ -57,6 +57,15 @@ impl Mixing {
         let sees_room = camera_layer || blend_mode != EnvironmentBlendMode::OPAQUE;
         let surroundings = if sees_room { Surroundings::Transparent } else { Surroundings::Dark };
         Self { blend_mode, camera_layer, surroundings }
+    }
+
+    /// What the user sees beside the pictures.
+    pub(super) fn sight(self) -> Sight {
+        match (self.sees_room(), self.blend_mode) {
+            (false, _) => Sight::Nothing,
+            (true, EnvironmentBlendMode::ADDITIVE) => Sight::RoomPlusLight,
+            (true, _) => Sight::Room,
+        }
     }
 
     /// Whether the user sees the room.
@@ -152,5 +161,9 @@ mod tests {
         assert!(varjo.sees_room() && !varjo.camera_layer && varjo.blend_mode == Mode::ALPHA_BLEND);
         let hololens = see(&[Mode::ADDITIVE], false);
         assert!(hololens.sees_room() && hololens.blend_mode == Mode::ADDITIVE);
+        assert_eq!(
+            [see(&[Mode::OPAQUE], false), quest, varjo, hololens].map(Mixing::sight),
+            [Sight::Nothing, Sight::Room, Sight::Room, Sight::RoomPlusLight]
+        );
     }
 }

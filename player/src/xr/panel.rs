@@ -121,11 +121,12 @@ impl Default for Panel {
 }
 
 impl Panel {
-    /// One pass: feeds the ray to the widgets and the widgets' wishes to the session and to `follow`.
+    /// One pass: feeds the ray to the widgets and the widgets' wishes to the session and to `follow`. `hint` is said in passing.
     pub fn run(
         &mut self,
         session: &mut Session,
         follow: &mut bool,
+        hint: Option<&str>,
         pointer: PanelPointer,
         now: Duration,
     ) -> FullOutput {
@@ -138,7 +139,7 @@ impl Panel {
         self.context.set_pixels_per_point(PIXELS_PER_POINT);
         self.before = pointer;
         self.context.run_ui(input, |ui| {
-            contents(ui, session, follow, now);
+            contents(ui, session, follow, hint, now);
             if let Some(at) = pointer.at {
                 let radius = if pointer.pressed { 4.0 } else { 6.0 };
                 ui.painter().circle_filled(at, radius, Color32::from_rgba_unmultiplied(255, 255, 255, 210));
@@ -181,7 +182,7 @@ fn events(before: PanelPointer, now: PanelPointer) -> Vec<Event> {
     events
 }
 
-fn contents(ui: &mut Ui, session: &mut Session, follow: &mut bool, now: Duration) {
+fn contents(ui: &mut Ui, session: &mut Session, follow: &mut bool, hint: Option<&str>, now: Duration) {
     let frame = Frame::new()
         .fill(Color32::from_rgba_unmultiplied(22, 24, 29, 235))
         .corner_radius(CornerRadius::same(14))
@@ -190,7 +191,7 @@ fn contents(ui: &mut Ui, session: &mut Session, follow: &mut bool, now: Duration
         ui.set_min_size(ui.available_size());
         ui.horizontal(|ui| {
             ui.label(RichText::new(position(session)).strong());
-            if let Some(problem) = session.problem() {
+            if let Some(problem) = session.problem().or(hint) {
                 ui.label(RichText::new(problem).small().color(Color32::from_rgb(240, 170, 90)));
             } else if session.is_waiting() {
                 ui.label(RichText::new("loading …").small());
@@ -280,7 +281,7 @@ mod tests {
             for pressed in [false, true, false] {
                 time += Duration::from_millis(300);
                 let pointer = PanelPointer { at: Some(pos2(x, y)), pressed };
-                panel.run(session, follow, pointer, time).drop_without_applying_deltas();
+                panel.run(session, follow, None, pointer, time).drop_without_applying_deltas();
                 session.update(time);
             }
         };

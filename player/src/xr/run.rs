@@ -112,6 +112,8 @@ pub(super) struct Show {
     pub(super) panel: Panel,
     pub(super) panel_pose: Option<PanelPose>,
     pub(super) pointer: PanelPointer,
+    /// What the panel says of the surface that is pointed at.
+    pub(super) hint: Option<String>,
     /// Whether the panel has to be drawn although nothing points at it.
     pub(super) panel_stale: bool,
     pub(super) guard: PlayGuard,
@@ -130,6 +132,7 @@ impl Show {
             panel: Panel::default(),
             panel_pose: None,
             pointer: PanelPointer::default(),
+            hint: None,
             panel_stale: true,
             guard: PlayGuard::default(),
             records: Vec::new(),

@@ -7,10 +7,13 @@ use std::time::Duration;
 use glam::{DQuat, DVec3};
 use protocol::pitch::Pitch;
 
-use super::{input::HandState, room};
-use crate::placement::{
-    Surface, SurfaceKind, TabletopPose,
-    gesture::{Event, Options, Output, Placement, Pointer, Ray},
+use super::{follow::Follow, input::HandState, room};
+use crate::{
+    placement::{
+        Surface, SurfaceKind, TabletopPose,
+        gesture::{Event, Options, Output, Placement, Pointer, Ray},
+    },
+    renderer::{Marks, RoomScene, Standing},
 };
 
 /// The placement with the memory of what the hands did.
@@ -20,8 +23,10 @@ pub(super) struct Table {
     /// Hands whose press began on something else: not ours until it ends.
     pressed_elsewhere: [bool; 2],
     surfaces: usize,
-    /// Where a match nobody has placed is drawn.
-    floating: TabletopPose,
+    /// Counts changes of what is known of the room.
+    revision: u32,
+    /// Where the match was drawn last.
+    drawn: TabletopPose,
 }
 
 impl Table {
@@ -31,7 +36,8 @@ impl Table {
             hands: [HandState::default(); 2],
             pressed_elsewhere: [false; 2],
             surfaces: 0,
-            floating: room::before_the_user(),
+            revision: 1,
+            drawn: room::before_the_user(),
         }
     }
 
@@ -39,6 +45,7 @@ impl Table {
     pub(super) fn know(&mut self, surfaces: Vec<Surface>, at_once: bool, now: Duration) {
         tracing::info!("the room has {} planes", surfaces.len());
         self.surfaces = surfaces.len();
+        self.revision = self.revision.wrapping_add(1);
         let table =
             surfaces.iter().find(|surface| surface.kind == SurfaceKind::Table).map(|surface| surface.id);
         self.placement.handle(Event::Surfaces(surfaces), now);
@@ -49,12 +56,14 @@ impl Table {
         }
     }
 
-    /// Head and hands of a frame. A hand in `elsewhere` points at something else: it lets go unless it is dragging.
+    /// Head and hands of a frame. A hand in `elsewhere` points at something else: it lets go unless it is dragging. A match that
+    /// stands is drawn `slide_m` away from where it is placed, and pointed at there.
     pub(super) fn follow(
         &mut self,
         (head_m, head): (DVec3, DQuat),
         hands: [HandState; 2],
         elsewhere: [bool; 2],
+        slide_m: DVec3,
         now: Duration,
     ) {
         self.placement.advance(now);
@@ -68,7 +77,9 @@ impl Table {
             let state = if away { HandState::default() } else { is };
             match state.ray {
                 Some((origin_m, direction)) => {
-                    self.placement.handle(Event::Point(pointer, Ray { origin_m, direction }), now);
+                    let slide_m = if self.is_placed() { slide_m } else { DVec3::ZERO };
+                    let ray = Ray { origin_m: origin_m - slide_m, direction };
+                    self.placement.handle(Event::Point(pointer, ray), now);
                 }
                 None if before.ray.is_some() => self.placement.handle(Event::PointAway(pointer), now),
                 None => {}
@@ -91,6 +102,9 @@ impl Table {
                 Output::Highlight(_) | Output::Anchor { .. } | Output::Lifted => {}
             }
         }
+        if let Some(model) = self.placement.shown().model {
+            self.drawn = model.pose;
+        }
     }
 
     /// The room is seen, or not.
@@ -102,11 +116,59 @@ impl Table {
     pub(super) fn recentred(&mut self, place_m: DVec3, turn: DQuat, now: Duration) {
         let rotation = turn.inverse();
         self.placement.handle(Event::RoomMoved { rotation, translation_m: rotation * -place_m }, now);
+        self.revision = self.revision.wrapping_add(1);
     }
 
-    /// Where the match is drawn.
+    /// Where the match is drawn or was last, before the ball is followed.
     pub(super) fn pose(&self) -> TabletopPose {
-        self.placement.shown().model.map_or(self.floating, |model| model.pose)
+        self.drawn
+    }
+
+    /// Whether somebody has put the match somewhere; otherwise a place is being chosen.
+    pub(super) fn is_placed(&self) -> bool {
+        self.placement.standing().is_some()
+    }
+
+    /// Whether a match that was placed has come to rest.
+    pub(super) fn is_settled(&self) -> bool {
+        self.is_placed() && self.placement.wakes_at().is_none_or(|at| at > self.placement.now())
+    }
+
+    /// Changes with everything that is known of the room's surfaces.
+    pub(super) fn revision(&self) -> u32 {
+        self.revision
+    }
+
+    /// What is known of the room's surfaces.
+    pub(super) fn surfaces(&self) -> impl Iterator<Item = &Surface> {
+        self.placement.surfaces()
+    }
+
+    /// Why the surface that is pointed at holds no match.
+    pub(super) fn hint(&self) -> Option<String> {
+        self.placement.shown().misfit.map(|misfit| misfit.to_string())
+    }
+
+    /// What is to be drawn: the match, slid by what follows the ball once it is placed, and the marks.
+    pub(super) fn scene(&self, follow: &Follow) -> RoomScene<'_> {
+        let shown = self.placement.shown();
+        let surface = |id| self.placement.surfaces().find(|surface| surface.id == id);
+        let placed = self.placement.standing();
+        let slid = |pose: &TabletopPose| if placed.is_some() { follow.applied(pose) } else { *pose };
+        let standing = shown.model.map(|model| {
+            let under = placed.map_or(shown.highlighted, |(_, id)| id).filter(|_| !model.floats);
+            Standing { pose: slid(&model.pose), opacity: model.opacity, on: under.and_then(surface) }
+        });
+        let highlighted = shown.highlighted.and_then(surface);
+        let handles = shown.handles_m.zip(shown.model).map(|(places_m, model)| {
+            let pose = slid(&model.pose);
+            (places_m.map(|place| place + pose.position_m - model.pose.position_m), pose)
+        });
+        let marks = Marks {
+            highlighted: highlighted.map(|surface| (surface.clone(), shown.misfit.is_none())),
+            handles,
+        };
+        RoomScene { standing, marks }
     }
 
     /// Planes known, and whether the match stands on one.
@@ -143,7 +205,7 @@ mod tests {
         let mut at = 0;
         let mut step = |table: &mut Table, hands, elsewhere| {
             at += 20;
-            table.follow(head, hands, elsewhere, Duration::from_millis(at));
+            table.follow(head, hands, elsewhere, DVec3::ZERO, Duration::from_millis(at));
         };
         table.know(vec![table_at(place)], false, Duration::ZERO);
         step(&mut table, hand(false), [false; 2]);
@@ -165,6 +227,79 @@ mod tests {
         let grass_m = table.pose().position_m.y - place.y;
         assert!((0.0..0.02).contains(&grass_m), "{grass_m}");
         assert!(table.pose().up().distance(DVec3::Y) < 1e-9);
+    }
+
+    /// Pointing highlights one surface and previews on it; placing shows handles; losing the room makes a ghost.
+    #[test]
+    fn what_is_drawn_follows_the_placement() {
+        let place = DVec3::new(0.0, -0.5, -1.0);
+        let head = (DVec3::ZERO, DQuat::from_rotation_x(-0.45));
+        let ray = Some((DVec3::ZERO, place.normalize()));
+        let mut table = Table::new(Pitch::default());
+        let follow = Follow::default();
+        let mut at = 0;
+        let mut steps = |table: &mut Table, hand: HandState, count: u64| {
+            for _ in 0..count {
+                at += 20;
+                let hands = [HandState::default(), hand];
+                table.follow(head, hands, [false; 2], DVec3::ZERO, Duration::from_millis(at));
+            }
+        };
+        let hand = |ray, select| HandState { ray, select, squeeze: false };
+        steps(&mut table, hand(None, false), 50);
+        let scene = table.scene(&follow);
+        assert!(scene.marks == Marks::default() && scene.standing.is_some_and(|match_| match_.on.is_none()));
+        let before = table.revision();
+        table.know(vec![table_at(place)], false, Duration::from_millis(1000));
+        assert_ne!(table.revision(), before);
+        steps(&mut table, hand(ray, false), 100);
+        let scene = table.scene(&follow);
+        assert!(
+            scene
+                .marks
+                .highlighted
+                .as_ref()
+                .is_some_and(|(surface, takes)| surface.id == SurfaceId(3) && *takes)
+        );
+        let preview = scene.standing.unwrap();
+        assert!(
+            preview.on.is_some() && (preview.opacity - 0.65).abs() < 1e-9 && scene.marks.handles.is_none()
+        );
+        assert!(!table.is_settled());
+        steps(&mut table, hand(ray, true), 1);
+        steps(&mut table, hand(ray, false), 100);
+        let scene = table.scene(&follow);
+        assert!(scene.marks.highlighted.is_none() && scene.marks.handles.is_some());
+        assert_eq!(scene.standing.map(|match_| match_.opacity), Some(1.0));
+        assert!(table.is_settled());
+        table.tracked(false, Duration::from_secs(6));
+        steps(&mut table, HandState::default(), 100);
+        let scene = table.scene(&follow);
+        assert!(scene.marks.handles.is_none());
+        assert!(scene.standing.is_some_and(|match_| (match_.opacity - 0.35).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_slid_match_is_pointed_at_where_it_is_drawn() {
+        let place = DVec3::new(0.0, -0.5, -1.0);
+        let slide_m = DVec3::new(0.3, 0.0, 0.0);
+        let mut table = Table::new(Pitch::default());
+        table.know(vec![table_at(place)], true, Duration::ZERO);
+        let head = (DVec3::ZERO, DQuat::from_rotation_x(-0.45));
+        let drag = |at_m: DVec3| HandState { ray: Some((DVec3::ZERO, at_m)), select: true, squeeze: false };
+        let start = table.placement.standing().unwrap().0;
+        // Beyond the right end of the placed turf, on the slid one.
+        let take_m = start.position_m + slide_m * 0.98 + DVec3::X * (start.scale * 52.0);
+        for (step, shift) in [0.0, -0.03, -0.06].into_iter().enumerate() {
+            let mut hand = drag(take_m + DVec3::X * shift);
+            for select in [step > 0, true] {
+                hand.select = select;
+                let now = Duration::from_millis(100 + 40 * step as u64 + u64::from(select));
+                table.follow(head, [HandState::default(), hand], [false; 2], slide_m, now);
+            }
+        }
+        let moved = table.placement.standing().unwrap().0.position_m - start.position_m;
+        assert!((moved.x + 0.06).abs() < 0.01 && moved.z.abs() < 1e-6, "{moved}");
     }
 
     #[test]

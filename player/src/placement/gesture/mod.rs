@@ -210,6 +210,12 @@ impl Placement {
         if moving { Some(self.now) } else { self.anchor_due }
     }
 
+    /// The time of the last event.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.now
+    }
+
     /// What to draw.
     #[must_use]
     pub fn shown(&self) -> Shown {

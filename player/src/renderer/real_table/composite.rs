@@ -13,7 +13,10 @@ use wgpu::{
     VertexState,
 };
 
-use super::{super::COLOUR_FORMAT, layer::Layer, linear_sampler};
+use super::{
+    super::{COLOUR_FORMAT, linear_sampler},
+    layer::Layer,
+};
 use crate::ar::{NEAR_M, RoomCamera, RoomPicture};
 
 /// What a structured-light sensor may be wrong by before the match is taken to be hidden: a part that does not depend

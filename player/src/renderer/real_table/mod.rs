@@ -3,19 +3,16 @@
 //! Three passes: the shadow that the room's light throws, the match with its depth, and the composite that hides what
 //! something real stands in front of. The same samples and integer noise as elsewhere: the same picture every time.
 
-mod cast;
 mod composite;
 mod layer;
 
 use glam::Vec3;
 use protocol::pitch::Pitch;
-use wgpu::{
-    AddressMode, CommandEncoder, Device, FilterMode, Queue, Sampler, SamplerDescriptor,
-    TextureViewDescriptor, vertex_attr_array,
-};
+use wgpu::{CommandEncoder, Device, Queue, TextureViewDescriptor, vertex_attr_array};
 
 use super::{
     PictureFormat, Renderer, Surroundings, Target,
+    cast::{Cast, Catcher},
     pipelines::{Kind, Mixing, build},
     view,
 };
@@ -24,7 +21,6 @@ use crate::{
     placement::TabletopPose,
     scene::{FrameScene, NetVertex, Stage},
 };
-use cast::Cast;
 use composite::Composite;
 use layer::Layer;
 
@@ -81,7 +77,8 @@ impl RealTable {
                 attributes: &vertex_attr_array![0 => Float32x3, 1 => Float32x2],
             },
         );
-        let cast = Cast::new(device, &renderer.scene_layout, stage.layout.half_turf_m, FORMAT);
+        let cast =
+            Cast::new(device, &renderer.scene_layout, stage.layout.half_turf_m, FORMAT, Catcher::Patch);
         Self { renderer, net_depth, cast, composite: Composite::new(device), layer: None }
     }
 
@@ -142,16 +139,4 @@ impl RealTable {
         });
         self.composite.draw(device, queue, encoder, layer, &finished, light.extend(opacity as f32));
     }
-}
-
-/// Samples a picture between its pixels; outside it the border goes on.
-fn linear_sampler(device: &Device, label: &str) -> Sampler {
-    device.create_sampler(&SamplerDescriptor {
-        label: Some(label),
-        address_mode_u: AddressMode::ClampToEdge,
-        address_mode_v: AddressMode::ClampToEdge,
-        mag_filter: FilterMode::Linear,
-        min_filter: FilterMode::Linear,
-        ..Default::default()
-    })
 }

@@ -19,16 +19,11 @@ struct Fragment {
 // Above the contact shadows, under the soles.
 const LIFT_M: f32 = 0.012;
 
-@vertex
-fn vertex(@builtin(vertex_index) index: u32) -> Fragment {
-  // Six corners for the table, six for the turf.
-  let on_turf = index / 6u;
-  let corner = index % 6u;
-  let at = vec2<f32>(f32(corner == 1u || corner == 2u || corner == 4u), f32(corner == 2u || corner >= 4u)) * 2.0 - 1.0;
-  let ground = at * select(light.half_m, stage.half_turf_m, on_turf == 1u);
+// A point of the ground; `clip` is still in world metres.
+fn on_ground(ground: vec2<f32>, on_turf: u32) -> Fragment {
   var out: Fragment;
   let height = select(-stage.turf_thickness_m, LIFT_M, on_turf == 1u);
-  out.clip = view.clip_from_world * vec4<f32>(ground.x, height, ground.y, 1.0);
+  out.clip = vec4<f32>(ground.x, height, ground.y, 1.0);
   out.ground_m = ground;
   out.on_turf = on_turf;
   return out;

@@ -1,5 +1,5 @@
-//! The shadow that the room's light throws: a map of the ground in which everything upright is flattened along the
-//! light, and the invisible ground that shows it on the real table and on the turf.
+//! The shadow that a light throws: a map of the ground in which everything upright is flattened along the light, and the
+//! invisible ground that shows it on the real table and on the turf.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec2, Vec3};
@@ -15,14 +15,16 @@ use wgpu::{
 };
 
 use super::{
-    super::{
-        PictureFormat, Renderer,
-        pipelines::{Kind, Mixing, build},
-    },
+    PictureFormat, Renderer,
+    buffers::Triangles,
     linear_sampler,
+    pipelines::{Kind, Mixing, build},
 };
 use crate::scene::{BodyVertex, SolidVertex};
 
+const PATCH: &str = concat!(include_str!("shaders/catcher.wgsl"), include_str!("shaders/catcher_patch.wgsl"));
+const OUTLINE: &str =
+    concat!(include_str!("shaders/catcher.wgsl"), include_str!("shaders/catcher_surface.wgsl"));
 /// Ground around the turf that shadows may reach, metres of the pitch.
 const AROUND_M: f64 = 20.0;
 /// Pixels of the map per metre of the pitch.
@@ -39,6 +41,15 @@ struct LightUniform {
     half_m: [f32; 2],
     strength: f32,
     padding: [f32; 3],
+}
+
+/// What shows the shadow around the turf.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Catcher {
+    /// A patch of the table's plane; something else knows where the table ends.
+    Patch,
+    /// Triangles of (x, z) in metres of the pitch: the outline of a surface.
+    Outline,
 }
 
 /// The map and what draws and shows it.
@@ -60,6 +71,7 @@ impl Cast {
         scene_layout: &BindGroupLayout,
         half_turf_m: [f64; 2],
         format: PictureFormat,
+        around: Catcher,
     ) -> Self {
         let half_m = half_turf_m.map(|half| half + AROUND_M);
         let [width, height] = half_m.map(|half| (2.0 * half * PX_PER_M) as u32);
@@ -107,15 +119,20 @@ impl Cast {
             bind_group_layouts: &[Some(scene_layout), Some(&caught_layout)],
             ..Default::default()
         });
-        let catcher = |mixing| {
+        let catcher = |mixing, around| {
+            let outline = vertex_attr_array![0 => Float32x2];
+            let (shader, stride, attributes): (_, _, &[_]) = match around {
+                Catcher::Patch => (PATCH, 0, &[]),
+                Catcher::Outline => (OUTLINE, size_of::<[f32; 2]>(), &outline),
+            };
             let kind = Kind {
                 name: "catcher",
-                shader: include_str!("../shaders/catcher.wgsl"),
+                shader,
                 mixing,
                 topology: PrimitiveTopology::TriangleList,
                 step_mode: VertexStepMode::Vertex,
-                stride: 0,
-                attributes: &[],
+                stride,
+                attributes,
             };
             build(device, format, &catching, &kind)
         };
@@ -127,8 +144,8 @@ impl Cast {
             caught,
             from_bodies: caster(device, &casting_layout, size_of::<BodyVertex>()),
             from_solids: caster(device, &casting_layout, size_of::<SolidVertex>()),
-            on_table: catcher(Mixing::TransparentWithDepth),
-            on_turf: catcher(Mixing::Transparent),
+            on_table: catcher(Mixing::TransparentWithDepth, around),
+            on_turf: catcher(Mixing::Transparent, Catcher::Patch),
         }
     }
 
@@ -170,11 +187,19 @@ impl Cast {
         renderer.bodies.draw(&mut pass);
     }
 
-    /// The shadow on the table; leaves the table's depth. The scene's bind group must be set.
+    /// The shadow on the table around the turf; leaves the table's depth. For [`Catcher::Patch`]. The scene's bind group must
+    /// be set.
     pub(super) fn draw_on_table(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.on_table);
         pass.set_bind_group(1, &self.caught, &[]);
         pass.draw(0..6, 0..1);
+    }
+
+    /// The same on the triangles of an outline, for [`Catcher::Outline`].
+    pub(super) fn draw_on_outline(&self, pass: &mut RenderPass<'_>, outline: &Triangles) {
+        pass.set_pipeline(&self.on_table);
+        pass.set_bind_group(1, &self.caught, &[]);
+        outline.draw(pass);
     }
 
     /// The shadow on the turf, after the turf.
@@ -221,7 +246,7 @@ fn caster(device: &Device, layout: &BindGroupLayout, stride: usize) -> RenderPip
     });
     let module = device.create_shader_module(ShaderModuleDescriptor {
         label: Some("cast"),
-        source: ShaderSource::Wgsl(include_str!("../shaders/cast.wgsl").into()),
+        source: ShaderSource::Wgsl(include_str!("shaders/cast.wgsl").into()),
     });
     device.create_render_pipeline(&RenderPipelineDescriptor {
         label: Some("cast"),
