@@ -8,13 +8,14 @@ use std::{
 
 use openxr::{
     Event, EventDataBuffer, FrameStream, FrameWaiter, Posef, ReferenceSpaceType, Session as XrSession, Space,
-    Vulkan,
+    Time, Vulkan,
 };
 
 use protocol::pitch::Pitch;
 
 use super::{
     XrError,
+    anchors::Anchors,
     eyes::Eyes,
     ffi::{graphics::Graphics, passthrough::CameraPicture},
     headset::{Headset, VIEWS},
@@ -22,13 +23,12 @@ use super::{
     lifecycle::{Action, Lifecycle},
     panel::Panel,
     panel_layer::PanelLayer,
-    planes::RuntimePlanes,
-    room,
+    planes::{self, RuntimePlanes},
+    room::{self, Rigid},
     run::{Show, XrOptions},
 };
 use crate::{
     camera::EyeView,
-    placement::PlaneSource,
     renderer::{PictureFormat, Sight},
     scene::Stage,
 };
@@ -47,6 +47,16 @@ pub(super) enum Ended {
     Lost,
 }
 
+/// A space of the runtime that moves.
+#[derive(Clone, Copy, Debug)]
+struct SpaceChange {
+    kind: ReferenceSpaceType,
+    /// From this time of display on.
+    from: Time,
+    /// Its new origin in its old frame, when the runtime says so.
+    origin: Option<Rigid>,
+}
+
 /// A headset with a session on it. Fields are dropped in this order: what hangs on the session before the session.
 pub(super) struct Connection {
     pub(super) eyes: Option<Eyes>,
@@ -54,7 +64,10 @@ pub(super) struct Connection {
     pub(super) pitch: Pitch,
     pub(super) panel: PanelLayer,
     pub(super) camera_picture: Option<CameraPicture>,
-    pub(super) planes: Option<RuntimePlanes>,
+    pub(super) planes: Option<Box<dyn RuntimePlanes>>,
+    pub(super) anchors: Anchors,
+    /// Spaces that are going to move.
+    changes: Vec<SpaceChange>,
     pub(super) input: Input,
     pub(super) space: Space,
     pub(super) waiter: FrameWaiter,
@@ -76,16 +89,13 @@ impl Connection {
         let headset = Headset::find()?;
         let graphics = Graphics::open(&headset.instance, headset.system)?;
         let (session, waiter, stream) = graphics.create_session(&headset.instance, headset.system)?;
-        let local = || session.create_reference_space(ReferenceSpaceType::LOCAL, Posef::IDENTITY);
-        let space = local()?;
+        let space = session.create_reference_space(ReferenceSpaceType::LOCAL, Posef::IDENTITY)?;
         let input = Input::new(&headset, &session)?;
         let panel = PanelLayer::new(&graphics, &session)?;
-        let planes = if headset.planes { RuntimePlanes::new(&session, local()?)? } else { None };
+        let planes = planes::source(&headset, &session)?;
+        let anchors = Anchors::new(&headset, &session)?;
         let camera_picture =
             headset.mixing.camera_layer.then(|| CameraPicture::start(&session)).transpose()?;
-        if planes.is_none() {
-            tracing::warn!("{} detects no planes: the match can only float", headset.runtime);
-        }
         if headset.mixing.sight() == Sight::RoomPlusLight {
             tracing::warn!("{} adds light to the room: no shadow falls on the real table", headset.runtime);
         }
@@ -97,6 +107,7 @@ impl Connection {
         figures.multiview = graphics.views_per_pass(options.samples) == 2;
         figures.samples = options.samples;
         figures.plane_source = planes.as_ref().map_or("none", |planes| planes.name()).to_owned();
+        figures.anchor = anchors.name().to_owned();
         figures.sessions += 1;
         // The new session's pictures know nothing of the letters that the old one's had.
         show.panel = Panel::default();
@@ -107,6 +118,8 @@ impl Connection {
             panel,
             camera_picture,
             planes,
+            anchors,
+            changes: Vec::new(),
             input,
             space,
             waiter,
@@ -128,7 +141,7 @@ impl Connection {
         // Compiling shaders takes a while: better now than in a frame.
         self.prepare(show, options, false)?;
         loop {
-            if let Some(ended) = self.take_events(show)? {
+            if let Some(ended) = self.take_events()? {
                 return Ok(ended);
             }
             if !self.life.is_running() {
@@ -142,10 +155,10 @@ impl Connection {
             }
             self.frame(show, options)?;
             if let Some(wanted) = options.exit_after_frames {
-                if show.records.len() >= wanted as usize {
+                if show.log.frames >= u64::from(wanted) {
                     self.leaving = true;
                     self.session.request_exit()?;
-                } else if show.records.is_empty() && begun.elapsed() > SCRIPT_PATIENCE {
+                } else if show.log.frames == 0 && begun.elapsed() > SCRIPT_PATIENCE {
                     let problem = show.player.problem().unwrap_or("no frame of the match within a minute");
                     return Err(XrError::Stream(problem.to_owned()));
                 }
@@ -154,7 +167,7 @@ impl Connection {
     }
 
     /// Takes in what the runtime reports.
-    fn take_events(&mut self, show: &mut Show) -> Result<Option<Ended>, XrError> {
+    fn take_events(&mut self) -> Result<Option<Ended>, XrError> {
         let mut buffer = EventDataBuffer::new();
         while let Some(event) = self.headset.instance.poll_event(&mut buffer)? {
             let action = match event {
@@ -172,8 +185,14 @@ impl Connection {
                     Action::Continue
                 }
                 Event::ReferenceSpaceChangePending(change) => {
-                    if change.reference_space_type() == ReferenceSpaceType::LOCAL && change.pose_valid() {
-                        show.recentred(room::rigid(change.pose_in_previous_space()));
+                    let origin = change.pose_valid().then(|| room::rigid(change.pose_in_previous_space()));
+                    let (kind, from) = (change.reference_space_type(), change.change_time());
+                    self.changes.push(SpaceChange { kind, from, origin });
+                    Action::Continue
+                }
+                Event::SpatialDiscoveryRecommendedEXT(_) => {
+                    if let Some(planes) = &mut self.planes {
+                        planes.look();
                     }
                     Action::Continue
                 }
@@ -203,6 +222,20 @@ impl Connection {
             }
         }
         Ok(None)
+    }
+
+    /// Lets the match stay where it is for the viewer when a space moves in a frame that is shown at `time`.
+    pub(super) fn move_spaces(&mut self, show: &mut Show, time: Time, now: Duration) {
+        let due = |change: &SpaceChange| change.from.as_nanos() <= time.as_nanos();
+        for change in self.changes.extract_if(.., |change| due(change)).collect::<Vec<_>>() {
+            tracing::info!("the {:?} space has moved: {:?}", change.kind, change.origin);
+            if self.anchors.space_changed(change.kind, change.origin) {
+                tracing::warn!("the runtime does not say how far: the match may stand somewhere else now");
+            }
+            if let (ReferenceSpaceType::LOCAL, Some(origin)) = (change.kind, change.origin) {
+                show.recentred(origin, now);
+            }
+        }
     }
 
     /// A frame without pictures, as the runtime demands while it takes its leave.

@@ -1,4 +1,4 @@
-//! What the frames of a headset cost, and the trace of every one of them.
+//! What a frame of a headset costs, and how such figures are summed up.
 //!
 //! Processor time is that of the frame loop's thread alone: loading, decoding and, on a software GPU, rasterising happen
 //! on others. A frame's wall time is told in two parts: outside the runtime's calls, where nothing may wait, and inside
@@ -25,6 +25,8 @@ pub struct FrameRecord {
     pub stalled: bool,
     /// Whether another frame of the match was uploaded.
     pub uploaded: bool,
+    /// Where the centre mark is drawn, room metres.
+    pub centre_m: [f64; 3],
 }
 
 /// Milliseconds of repeated measurements.
@@ -52,21 +54,6 @@ impl Spread {
     }
 }
 
-/// Frame times that the runtime asked for and did not get: every whole period of the display that passed between two
-/// frames beyond the one that is due.
-#[must_use]
-pub fn dropped(records: &[FrameRecord], period: Duration) -> u64 {
-    let period = period.as_nanos() as f64;
-    if period <= 0.0 {
-        return 0;
-    }
-    let gaps = records.windows(2).filter_map(|pair| {
-        let [before, after] = pair else { return None };
-        Some((after.predicted_display_ns - before.predicted_display_ns) as f64 / period)
-    });
-    gaps.map(|periods| (periods.round() - 1.0).max(0.0) as u64).sum()
-}
-
 /// Milliseconds of a duration.
 #[must_use]
 pub fn milliseconds(duration: Duration) -> f64 {
@@ -76,27 +63,6 @@ pub fn milliseconds(duration: Duration) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn record(predicted_display_ns: i64) -> FrameRecord {
-        FrameRecord {
-            predicted_display_ns,
-            cpu_ms: 1.0,
-            own_ms: 1.0,
-            runtime_ms: 0.0,
-            match_frame: None,
-            stalled: false,
-            uploaded: false,
-        }
-    }
-
-    #[test]
-    fn a_skipped_period_is_a_dropped_frame() {
-        let records = [0, 10, 21, 40, 49].map(|ms| record(ms * 1_000_000));
-        assert_eq!(dropped(&records, Duration::from_millis(10)), 1);
-        assert_eq!(dropped(&records[..2], Duration::from_millis(10)), 0);
-        assert_eq!(dropped(&records, Duration::ZERO), 0);
-        assert_eq!(dropped(&[], Duration::from_millis(10)), 0);
-    }
 
     #[test]
     fn percentiles_of_few_values() {

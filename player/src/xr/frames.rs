@@ -18,6 +18,7 @@ use openxr::{
 
 use super::{
     XrError,
+    anchors::Moved,
     connection::Connection,
     eyes::{Eyes, IMAGE_TIMEOUT_NS},
     ffi::clock::thread_cpu_time,
@@ -30,7 +31,7 @@ use super::{
     run::{Show, XrOptions},
     table::Table,
 };
-use crate::{placement::PlaneSource, session::Session};
+use crate::session::Session;
 
 /// Where time goes in a frame.
 struct Watch {
@@ -58,8 +59,9 @@ impl Watch {
         Ok(result?)
     }
 
-    fn record(&self, time: Time, player: &Session, uploaded: bool) -> FrameRecord {
+    fn record(&self, time: Time, player: &Session, uploaded: bool, centre_m: DVec3) -> FrameRecord {
         FrameRecord {
+            centre_m: centre_m.into(),
             predicted_display_ns: time.as_nanos(),
             cpu_ms: milliseconds(thread_cpu_time().saturating_sub(self.cpu)),
             own_ms: milliseconds(self.begun.elapsed().saturating_sub(self.in_runtime + self.aside)),
@@ -85,6 +87,7 @@ impl Connection {
         let Ok(located) = <[openxr::View; 2]>::try_from(located) else {
             return Err(XrError::NoRuntime("it locates a number of views that is not two".to_owned()));
         };
+        self.move_spaces(show, time, now);
         show.table.tracked(flags.contains(ViewStateFlags::POSITION_VALID), now);
         if !state.should_render || !flags.contains(ViewStateFlags::ORIENTATION_VALID) {
             return watch.runtime(|| self.stream.end(time, blend_mode, &[]));
@@ -104,7 +107,7 @@ impl Connection {
         watch.runtime(|| eyes.images.swapchain.wait_image(openxr::Duration::from_nanos(IMAGE_TIMEOUT_NS)))?;
         eyes.draw(&self.graphics, image, &show.table, &show.table.scene(&show.follow), &looking)?;
         let on_show = shows_the_match(&show.player, options) && is_still(&show.table, options);
-        let last = options.exit_after_frames.is_some_and(|wanted| show.records.len() + 1 >= wanted as usize);
+        let last = options.exit_after_frames.is_some_and(|wanted| show.log.frames + 1 >= u64::from(wanted));
         if let (true, true, Some(folder)) = (last, on_show, &options.capture) {
             let began = Instant::now();
             save(folder, &eyes.read_back(&self.graphics, image)?)?;
@@ -131,9 +134,12 @@ impl Connection {
         }
         watch.runtime(|| self.stream.end(time, blend_mode, &layers))?;
         if on_show {
-            show.figures.display_period_ms = state.predicted_display_period.as_nanos() as f64 / 1e6;
+            let period_ns = u64::try_from(state.predicted_display_period.as_nanos()).unwrap_or_default();
+            show.figures.display_period_ms = period_ns as f64 / 1e6;
             (show.figures.planes, show.figures.on_a_plane) = show.table.stands();
-            show.records.push(watch.record(time, &show.player, changed));
+            let centre_m = show.follow.applied(&show.table.pose()).position_m;
+            let record = watch.record(time, &show.player, changed, centre_m);
+            show.log.add(record, Duration::from_nanos(period_ns), options.trace);
         }
         Ok(())
     }
@@ -211,6 +217,16 @@ impl Connection {
                 show.table.know(surfaces, options.place, now);
             }
         }
+        let wanted = show.table.anchor();
+        match self.anchors.update(&self.session, wanted, (&self.space, time), now)? {
+            Some(Moved::Anchor(generation, place)) => {
+                show.figures.anchor_corrections += 1;
+                show.table.anchor_moved(generation, place, now);
+            }
+            Some(Moved::Frame(origin)) => show.recentred(origin, now),
+            None => {}
+        }
+        self.anchors.name().clone_into(&mut show.figures.anchor);
         if self.life.has_input() {
             self.input.read(&self.session, &self.space, time, head)
         } else {
@@ -270,9 +286,9 @@ fn shows_the_match(player: &Session, options: &XrOptions) -> bool {
     }
 }
 
-/// Whether a picture can be taken: a match that a script has placed fades in first.
+/// Whether a picture can be taken: the match fades in first.
 fn is_still(table: &Table, options: &XrOptions) -> bool {
-    options.frame.is_none() || !table.is_placed() || table.is_settled()
+    options.frame.is_none() || table.is_settled()
 }
 
 fn save(folder: &Path, [left, right]: &[image::RgbaImage; 2]) -> Result<(), XrError> {

@@ -30,7 +30,12 @@ pub(super) struct Headset {
     /// What was asked for and given.
     pub(super) extensions: ExtensionSet,
     pub(super) hand_tracking: bool,
-    pub(super) planes: bool,
+    /// XR_EXT_plane_detection.
+    pub(super) detects_planes: bool,
+    /// XR_EXT_spatial_plane_tracking.
+    pub(super) tracks_planes: bool,
+    /// XR_EXT_spatial_anchor.
+    pub(super) keeps_anchors: bool,
 }
 
 /// How the pictures mix with the room.
@@ -115,19 +120,24 @@ impl Headset {
             most_px: (view.max_image_rect_width, view.max_image_rect_height),
             mixing,
             hand_tracking: enabled.ext_hand_tracking && instance.supports_hand_tracking(system)?,
-            planes: enabled.ext_plane_detection && ffi::planes::supported(&instance, system),
+            detects_planes: enabled.ext_plane_detection && ffi::planes::supported(&instance, system),
+            tracks_planes: enabled.ext_spatial_plane_tracking
+                && ffi::spatial_planes::supported(&instance, system),
+            keeps_anchors: enabled.ext_spatial_anchor && ffi::spatial_anchor::supported(&instance, system),
             extensions: enabled,
             instance,
             system,
         };
         tracing::info!(
-            "{} with {}: {:?} px an eye, blend modes {modes:?}, {:?}, hands {}, planes {}",
+            "{} with {}: {:?} px an eye, blend modes {modes:?}, {:?}, hands {}, planes detected {} tracked {}, anchors {}",
             headset.runtime,
             headset.name,
             headset.recommended_px,
             headset.mixing,
             headset.hand_tracking,
-            headset.planes
+            headset.detects_planes,
+            headset.tracks_planes,
+            headset.keeps_anchors
         );
         Ok(headset)
     }
@@ -141,6 +151,11 @@ fn wanted(offered: &ExtensionSet) -> ExtensionSet {
     enabled.ext_hand_interaction = offered.ext_hand_interaction;
     enabled.msft_hand_interaction = offered.msft_hand_interaction;
     enabled.ext_plane_detection = offered.ext_plane_detection;
+    let spatial = offered.ext_future && offered.ext_spatial_entity;
+    enabled.ext_future = spatial;
+    enabled.ext_spatial_entity = spatial;
+    enabled.ext_spatial_plane_tracking = spatial && offered.ext_spatial_plane_tracking;
+    enabled.ext_spatial_anchor = spatial && offered.ext_spatial_anchor;
     enabled.ext_user_presence = offered.ext_user_presence;
     enabled.fb_passthrough = offered.fb_passthrough;
     enabled

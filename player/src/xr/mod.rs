@@ -4,6 +4,7 @@
 //! everything else of the player works. Foreign interfaces are in `ffi`; what can be decided without a headset is in
 //! modules without one ([`lifecycle`], [`figures`]) and tested there.
 
+mod anchors;
 mod connection;
 mod cost;
 mod error;
@@ -11,6 +12,7 @@ mod eyes;
 mod ffi;
 pub mod figures;
 pub mod follow;
+pub mod frame_log;
 mod frames;
 mod headset;
 mod input;

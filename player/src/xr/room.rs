@@ -43,9 +43,23 @@ pub(super) fn orientation(q: Quaternionf) -> DQuat {
     if length.is_finite() && length > 1e-6 { raw / length } else { DQuat::IDENTITY }
 }
 
+/// Place and turn: maps a point p to turn · p + place.
+pub(super) type Rigid = (DVec3, DQuat);
+
 /// Place and turn of a pose.
-pub(super) fn rigid(pose: Posef) -> (DVec3, DQuat) {
+pub(super) fn rigid(pose: Posef) -> Rigid {
     (position(pose.position), orientation(pose.orientation))
+}
+
+/// First `inner`, then `outer`.
+pub(super) fn compose(outer: Rigid, inner: Rigid) -> Rigid {
+    (outer.0 + outer.1 * inner.0, (outer.1 * inner.1).normalize())
+}
+
+/// The way back.
+pub(super) fn inverse(way: Rigid) -> Rigid {
+    let back = way.1.inverse();
+    (back * -way.0, back)
 }
 
 pub(super) fn pose(position_m: DVec3, orientation: DQuat) -> Posef {
@@ -68,6 +82,13 @@ mod tests {
         assert!(orientation(there.orientation).angle_between(turn) < 1e-3);
         let nonsense = Quaternionf { x: 0.0, y: f32::NAN, z: 0.0, w: 0.0 };
         assert_eq!(orientation(nonsense), DQuat::IDENTITY);
+    }
+
+    #[test]
+    fn there_and_back_is_nowhere() {
+        let way = (DVec3::new(0.1, 1.5, -2.0), DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(0.2));
+        let (place, turn) = compose(way, inverse(way));
+        assert!(place.length() < 1e-12 && turn.angle_between(DQuat::IDENTITY) < 1e-6);
     }
 
     #[test]

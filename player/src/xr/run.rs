@@ -8,7 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use glam::{DQuat, DVec3};
 use protocol::pitch::Pitch;
 use serde::Serialize;
 
@@ -16,11 +15,13 @@ use super::{
     XrError,
     connection::{Connection, Ended},
     cost::{self, Cost},
-    figures::{FrameRecord, Spread, dropped},
+    figures::{FrameRecord, Spread},
     follow::Follow,
+    frame_log::FrameLog,
     headset::Headset,
     lifecycle::PlayGuard,
     panel::{Panel, PanelPointer, PanelPose},
+    room::Rigid,
     table::Table,
 };
 use crate::{scene::Layout, session::Session};
@@ -71,6 +72,12 @@ pub struct XrFigures {
     pub blend_mode: String,
     /// Where the planes of the room come from.
     pub plane_source: String,
+    /// What keeps the match in its place: an anchor of the runtime, or one of its spaces.
+    pub anchor: String,
+    /// How often the runtime corrected that place.
+    pub anchor_corrections: u32,
+    /// How often the room's frame was moved, by the user or by the runtime.
+    pub frame_moves: u32,
     /// Level planes that the source has reported last.
     pub planes: usize,
     /// Whether the match stands on one of them.
@@ -99,7 +106,7 @@ pub struct XrFigures {
     pub sessions: u32,
     /// Sessions or instances lost.
     pub losses: u32,
-    /// Every frame, when asked for.
+    /// Every frame (the first 110,000), when asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trace: Vec<FrameRecord>,
 }
@@ -117,7 +124,7 @@ pub(super) struct Show {
     /// Whether the panel has to be drawn although nothing points at it.
     pub(super) panel_stale: bool,
     pub(super) guard: PlayGuard,
-    pub(super) records: Vec<FrameRecord>,
+    pub(super) log: FrameLog,
     pub(super) figures: XrFigures,
     pub(super) started: Instant,
     pub(super) has_started_playing: bool,
@@ -135,7 +142,7 @@ impl Show {
             hint: None,
             panel_stale: true,
             guard: PlayGuard::default(),
-            records: Vec::new(),
+            log: FrameLog::default(),
             figures: XrFigures::default(),
             started: Instant::now(),
             has_started_playing: false,
@@ -158,8 +165,8 @@ impl Show {
     }
 
     /// The room frame has moved: its new origin in the old frame.
-    pub(super) fn recentred(&mut self, (place_m, turn): (DVec3, DQuat)) {
-        let now = self.now();
+    pub(super) fn recentred(&mut self, (place_m, turn): Rigid, now: Duration) {
+        self.figures.frame_moves += 1;
         self.table.recentred(place_m, turn, now);
         self.panel_pose = None;
     }
@@ -179,7 +186,7 @@ pub fn run(player: Session, options: &XrOptions) -> Result<XrFigures, XrError> {
             Ok(ended)
         });
         match ended {
-            Ok(Ended::Left) => return Ok(finish(show, options)),
+            Ok(Ended::Left) => return Ok(finish(show)),
             Ok(Ended::Lost) => wait_for_return(&mut show, "the session was lost")?,
             Err(error) if error.is_loss() && show.figures.sessions > 0 => {
                 wait_for_return(&mut show, &error.to_string())?;
@@ -212,19 +219,15 @@ fn wait_for_return(show: &mut Show, reason: &str) -> Result<(), XrError> {
     }
 }
 
-fn finish(show: Show, options: &XrOptions) -> XrFigures {
-    let Show { mut figures, records, .. } = show;
-    let period = Duration::from_secs_f64(figures.display_period_ms.max(0.0) / 1e3);
-    let stalled = || records.iter().filter(|record| record.stalled);
-    figures.frames = records.len() as u64;
-    figures.dropped_frames = dropped(&records, period);
-    figures.frame_cpu = Spread::of(records.iter().map(|record| record.cpu_ms));
-    figures.frame_own = Spread::of(records.iter().map(|record| record.own_ms));
-    figures.frame_runtime = Spread::of(records.iter().map(|record| record.runtime_ms));
-    figures.stalled_frames = stalled().count() as u64;
-    figures.stalled_frame_own = Spread::of(stalled().map(|record| record.own_ms));
-    if options.trace {
-        figures.trace = records;
-    }
+fn finish(show: Show) -> XrFigures {
+    let Show { mut figures, log, .. } = show;
+    figures.frames = log.frames;
+    figures.dropped_frames = log.dropped;
+    figures.frame_cpu = log.cpu.spread();
+    figures.frame_own = log.own.spread();
+    figures.frame_runtime = log.runtime.spread();
+    figures.stalled_frames = log.stalled;
+    figures.stalled_frame_own = log.stalled_own.spread();
+    figures.trace = log.trace;
     figures
 }

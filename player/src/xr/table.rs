@@ -7,7 +7,11 @@ use std::time::Duration;
 use glam::{DQuat, DVec3};
 use protocol::pitch::Pitch;
 
-use super::{follow::Follow, input::HandState, room};
+use super::{
+    follow::Follow,
+    input::HandState,
+    room::{self, Rigid},
+};
 use crate::{
     placement::{
         Surface, SurfaceKind, TabletopPose,
@@ -27,6 +31,10 @@ pub(super) struct Table {
     revision: u32,
     /// Where the match was drawn last.
     drawn: TabletopPose,
+    /// Opacity in the last two frames.
+    opacities: [Option<f64>; 2],
+    /// The anchor that the placement wants.
+    anchor: Option<u32>,
 }
 
 impl Table {
@@ -38,6 +46,8 @@ impl Table {
             surfaces: 0,
             revision: 1,
             drawn: room::before_the_user(),
+            opacities: [None; 2],
+            anchor: None,
         }
     }
 
@@ -99,10 +109,14 @@ impl Table {
                 Output::Placed(surface) => tracing::info!("the match stands on {surface:?}"),
                 Output::Landed(surface) => tracing::info!("the match came to stand on {surface:?}"),
                 Output::Refused(misfit) => tracing::warn!("{misfit}"),
-                Output::Highlight(_) | Output::Anchor { .. } | Output::Lifted => {}
+                Output::Anchor { generation, .. } => self.anchor = Some(generation),
+                Output::Lifted => self.anchor = None,
+                Output::Highlight(_) => {}
             }
         }
-        if let Some(model) = self.placement.shown().model {
+        let model = self.placement.shown().model;
+        self.opacities = [self.opacities[1], model.map(|model| model.opacity)];
+        if let Some(model) = model {
             self.drawn = model.pose;
         }
     }
@@ -119,6 +133,17 @@ impl Table {
         self.revision = self.revision.wrapping_add(1);
     }
 
+    /// The anchor that is wanted: its number, and where the match is to stand.
+    pub(super) fn anchor(&self) -> Option<(u32, Rigid)> {
+        let (pose, _) = self.placement.standing()?;
+        Some((self.anchor?, (pose.position_m, pose.orientation)))
+    }
+
+    /// The runtime knows better where that anchor is.
+    pub(super) fn anchor_moved(&mut self, generation: u32, (position_m, orientation): Rigid, now: Duration) {
+        self.placement.handle(Event::AnchorMoved { generation, position_m, orientation }, now);
+    }
+
     /// Where the match is drawn or was last, before the ball is followed.
     pub(super) fn pose(&self) -> TabletopPose {
         self.drawn
@@ -129,9 +154,12 @@ impl Table {
         self.placement.standing().is_some()
     }
 
-    /// Whether a match that was placed has come to rest.
+    /// Whether the match has come to rest where it was placed, or the preview has faded in.
     pub(super) fn is_settled(&self) -> bool {
-        self.is_placed() && self.placement.wakes_at().is_none_or(|at| at > self.placement.now())
+        if self.is_placed() {
+            return self.placement.wakes_at().is_none_or(|at| at > self.placement.now());
+        }
+        self.opacities[0] == self.opacities[1]
     }
 
     /// Changes with everything that is known of the room's surfaces.
@@ -265,8 +293,9 @@ mod tests {
         assert!(
             preview.on.is_some() && (preview.opacity - 0.65).abs() < 1e-9 && scene.marks.handles.is_none()
         );
-        assert!(!table.is_settled());
+        assert!(table.is_settled());
         steps(&mut table, hand(ray, true), 1);
+        assert!(!table.is_settled());
         steps(&mut table, hand(ray, false), 100);
         let scene = table.scene(&follow);
         assert!(scene.marks.highlighted.is_none() && scene.marks.handles.is_some());
@@ -300,6 +329,44 @@ mod tests {
         }
         let moved = table.placement.standing().unwrap().0.position_m - start.position_m;
         assert!((moved.x + 0.06).abs() < 0.01 && moved.z.abs() < 1e-6, "{moved}");
+    }
+
+    /// A corrected anchor moves the match by steps that the eye follows; a moved frame moves nothing for the viewer.
+    #[test]
+    fn corrections_glide_and_recentring_is_not_seen() {
+        let place = DVec3::new(0.0, -0.5, -1.0);
+        let mut table = Table::new(Pitch::default());
+        table.know(vec![table_at(place)], true, Duration::ZERO);
+        let mut head = (DVec3::ZERO, DQuat::from_rotation_x(-0.45));
+        let mut at = 0;
+        let mut step = |table: &mut Table, head| {
+            at += 11;
+            table.follow(head, [HandState::default(); 2], [false; 2], DVec3::ZERO, Duration::from_millis(at));
+            Duration::from_millis(at)
+        };
+        for _ in 0..200 {
+            step(&mut table, head);
+        }
+        let (generation, (was_m, turned)) = table.anchor().expect("an anchor is wanted");
+        let now = step(&mut table, head);
+        table.anchor_moved(generation, (was_m + DVec3::X * 0.05, turned), now);
+        let mut before = table.pose().position_m;
+        for _ in 0..200 {
+            step(&mut table, head);
+            let moved = table.pose().position_m.distance(before);
+            assert!(moved < 0.5 * 0.011 + 1e-6, "{moved} m in one frame");
+            before = table.pose().position_m;
+        }
+        assert!(before.distance(was_m + DVec3::X * 0.05) < 1e-6);
+        let origin = (DVec3::new(0.4, 0.0, 0.3), DQuat::from_rotation_y(0.8));
+        let seen = room::compose(room::inverse(head), (before, table.pose().orientation));
+        let now = step(&mut table, head);
+        table.recentred(origin.0, origin.1, now);
+        head = room::compose(room::inverse(origin), head);
+        step(&mut table, head);
+        let pose = table.pose();
+        let sees = room::compose(room::inverse(head), (pose.position_m, pose.orientation));
+        assert!(sees.0.distance(seen.0) < 1e-9 && sees.1.angle_between(seen.1) < 1e-6, "{sees:?} {seen:?}");
     }
 
     #[test]

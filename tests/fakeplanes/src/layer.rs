@@ -12,7 +12,7 @@ use openxr_sys::{
     SystemId, SystemPlaneDetectionPropertiesEXT, SystemProperties, pfn,
 };
 
-use crate::{planes, planted};
+use crate::{planes, planted, room, spatial};
 
 /// The layer or runtime below; made anew with every instance.
 static BELOW: RwLock<Option<pfn::GetInstanceProcAddr>> = RwLock::new(None);
@@ -23,6 +23,11 @@ pub(crate) fn set_below(below: pfn::GetInstanceProcAddr) {
     if let Ok(mut slot) = BELOW.write() {
         *slot = Some(below);
     }
+}
+
+/// The instance whose functions are wrapped.
+pub(crate) fn instance() -> Option<Instance> {
+    INSTANCE.read().ok().and_then(|slot| *slot)
 }
 
 /// A function of the layer below.
@@ -79,7 +84,7 @@ pub(crate) unsafe extern "system" fn get_instance_proc_addr(
                 Some(transmute::<pfn::CreateVulkanDeviceKHR, pfn::VoidFunction>(planted::create_device))
             }
             b"xrWaitFrame" => Some(transmute::<pfn::WaitFrame, pfn::VoidFunction>(wait_frame)),
-            _ => None,
+            name => spatial::function(name).or_else(|| room::function(name)),
         }
     };
     if let (Ok(mut slot), Some(_)) = (INSTANCE.write(), ours) {
@@ -135,9 +140,7 @@ unsafe extern "system" fn wait_frame(
     if wish.is_some_and(|path| std::fs::remove_file(path).is_ok()) {
         return Result::ERROR_SESSION_LOST;
     }
-    let Some(instance) = INSTANCE.read().ok().and_then(|slot| *slot) else {
-        return Result::ERROR_INSTANCE_LOST;
-    };
+    let Some(instance) = instance() else { return Result::ERROR_INSTANCE_LOST };
     // SAFETY: the instance of the session is live, and the name is a C string.
     let (result, function) = unsafe { below(instance, c"xrWaitFrame".as_ptr()) };
     let Some(function) = function else { return result };

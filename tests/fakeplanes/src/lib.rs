@@ -1,4 +1,5 @@
-//! An OpenXR API layer that adds XR_EXT_plane_detection to any runtime: one table, one floor, and on demand a lost session.
+//! An OpenXR API layer that adds XR_EXT_plane_detection or XR_EXT_spatial_plane_tracking and XR_EXT_spatial_anchor to any
+//! runtime: one table, one floor, one anchor, and on demand a lost session, a seen room, a user who recentres.
 //!
 //! The loader puts it between a program and the runtime (`manifest` in `tests/tests/headset/`). It answers the extension's
 //! functions itself, says in the system's properties that planes are detected, hides the extension from the runtime below,
@@ -10,6 +11,8 @@
 mod layer;
 mod planes;
 mod planted;
+mod room;
+mod spatial;
 
 use std::{ffi::c_char, ptr};
 

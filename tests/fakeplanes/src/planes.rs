@@ -13,14 +13,15 @@ use openxr_sys::{
 const DETECTOR: u64 = 0x7AB1E;
 
 /// A plane with its outline in its own x and z axes.
-struct FakePlane {
-    id: u64,
-    position_m: [f32; 3],
-    half_m: [f32; 2],
+pub(crate) struct FakePlane {
+    pub(crate) id: u64,
+    pub(crate) position_m: [f32; 3],
+    pub(crate) half_m: [f32; 2],
     meaning: PlaneDetectorSemanticTypeEXT,
 }
 
-const PLANES: [FakePlane; 2] = [
+/// A table, then a floor.
+pub(crate) const PLANES: [FakePlane; 2] = [
     FakePlane {
         id: 11,
         position_m: [0.05, -0.45, -0.95],
@@ -39,7 +40,15 @@ const PLANES: [FakePlane; 2] = [
 /// `name` is a C string.
 pub(crate) unsafe fn is_extension(name: *const c_char) -> bool {
     // SAFETY: as the caller says.
-    unsafe { CStr::from_ptr(name) == c"XR_EXT_plane_detection" }
+    let name = unsafe { CStr::from_ptr(name) };
+    [
+        c"XR_EXT_plane_detection",
+        c"XR_EXT_future",
+        c"XR_EXT_spatial_entity",
+        c"XR_EXT_spatial_plane_tracking",
+        c"XR_EXT_spatial_anchor",
+    ]
+    .contains(&name)
 }
 
 pub(crate) unsafe extern "system" fn create(

@@ -2,7 +2,8 @@
 //!
 //! The driver listens on port 4242 and takes packets of 376 bytes (Monado's `r_interface.h`, protocol `mndrmt3`): both eyes'
 //! fields of view and poses, the head's pose, two controllers. This sends one and holds the connection until it is killed;
-//! with the argument `select` the right controller points at the table of the tests and pulls its trigger every second.
+//! with the argument `point` the right controller points at the table of the tests, with `select` it also pulls its trigger
+//! every second.
 
 use std::{
     io::{self, Read, Write},
@@ -29,7 +30,7 @@ fn floats(packet: &mut Vec<u8>, values: &[f32]) {
 /// Down by 35 degrees: from the hand over the panel to the table.
 const AT_THE_TABLE: [f32; 4] = [-0.300_706, 0.0, 0.0, 0.953_717];
 
-fn packet(selects: bool, pressed: bool) -> Vec<u8> {
+fn packet(at_the_table: bool, pressed: bool) -> Vec<u8> {
     let mut packet = b"mndrmt3\0".to_vec();
     for x in [-HALF_EYES_M, HALF_EYES_M] {
         floats(&mut packet, &FOV);
@@ -41,7 +42,7 @@ fn packet(selects: bool, pressed: bool) -> Vec<u8> {
     floats(&mut packet, &[0.0, STANDING_M, 0.0]);
     // The poses of the eyes are valid.
     packet.extend([1, 0, 0, 0]);
-    for (x, points) in [(-0.2, false), (0.2, selects)] {
+    for (x, points) in [(-0.2, false), (0.2, at_the_table)] {
         floats(&mut packet, if points { &AT_THE_TABLE } else { &UPRIGHT });
         floats(&mut packet, &[x, STANDING_M, -0.3]);
         // Velocities, sticks, fingers.
@@ -56,8 +57,10 @@ fn packet(selects: bool, pressed: bool) -> Vec<u8> {
 }
 
 fn main() -> io::Result<()> {
-    let selects = std::env::args().nth(1).is_some_and(|argument| argument == "select");
-    let first = packet(selects, false);
+    let argument = std::env::args().nth(1).unwrap_or_default();
+    let selects = argument == "select";
+    let points = selects || argument == "point";
+    let first = packet(points, false);
     assert_eq!(first.len(), PACKET_BYTES);
     let mut connection = loop {
         match TcpStream::connect(("127.0.0.1", 4242)) {
@@ -73,7 +76,7 @@ fn main() -> io::Result<()> {
     if selects {
         for pressed in [true, false].into_iter().cycle() {
             thread::sleep(Duration::from_millis(500));
-            connection.write_all(&packet(selects, pressed))?;
+            connection.write_all(&packet(points, pressed))?;
         }
     }
     let mut rest = [0; 1024];

@@ -4,6 +4,10 @@
 //! The cup is no known surface: nothing tells the headset of it, and the match is drawn over it.
 
 use glam::{DMat3, DQuat, DVec3};
+use holopitch_tests::{
+    excerpt,
+    snapshot::{Snapshot, compare},
+};
 use image::{Rgba, RgbaImage};
 use player::{
     ar::{RoomCamera, synthetic::SyntheticRoom},
@@ -17,7 +21,7 @@ use player::{
 };
 use protocol::{limits::Limits, pitch::Pitch};
 
-use super::{MEAN, WORST_BLOCK, frame, snapshot::Snapshot, snapshot::compare, software_adapter};
+use super::{MEAN, WORST_BLOCK, software_adapter};
 
 const SIZE_PX: (u32, u32) = (480, 360);
 const FORMAT: PictureFormat = PictureFormat {
@@ -99,7 +103,7 @@ fn draw(view: usize, opacity: f64, known: &[Surface], highlighted: bool, sight: 
     let pose = fit(&table, &wish).unwrap();
     let stage = Stage::on_real_table(Pitch::default());
     let mut in_room = InRoom::new(&gpu.device, &gpu.queue, &stage, FORMAT, sight);
-    let frame = FrameScene::new(&frame(), &[], &Limits::default()).unwrap();
+    let frame = FrameScene::new(&excerpt::frame(), &[], &Limits::default()).unwrap();
     in_room.upload(&gpu.device, &gpu.queue, &frame);
     in_room.know(&gpu.device, &gpu.queue, known.iter());
     let [x, z] = stage.layout.half_turf_m.map(|half| half * 1.06 * pose.scale);

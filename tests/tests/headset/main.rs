@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod real_room;
 mod runtime;
 mod stalling_server;
 
@@ -15,7 +16,7 @@ use holopitch_tests::{
     snapshot::{self, Snapshot},
 };
 use protocol::{manifest::FILE_NAME, sample};
-use runtime::{Head, Runtime, figures, folder, succeeded};
+use runtime::{Head, Planes, Runtime, figures, folder, succeeded, wait_for};
 
 /// One runtime at a time: the machine has few processors, and times are measured.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -91,15 +92,18 @@ fn a_lost_session_and_a_lost_runtime_are_made_anew_and_the_match_goes_on() {
     let Some(mut runtime) = start(Head::Wobbling, 300) else { return };
     // Enough frames that the fastest machine still draws when the runtime goes.
     let script = ["--exit-after-frames", "600", "--json", "/mnt/out/figures.json"];
-    let player = runtime.player("/mnt/stream", &script).env("RUST_LOG", "info").spawn().unwrap();
-    thread::sleep(Duration::from_secs(4));
+    let log = runtime.out().join("player.log");
+    let mut player = runtime.player_with(Planes::Detected, &[("RUST_LOG", "info")], "/mnt/stream", &script);
+    let player = player.stderr(fs::File::create(&log).unwrap()).spawn().unwrap();
+    wait_for(&log, "session: FOCUSED", 1);
     fs::write(runtime.out().join("lose"), "").unwrap();
-    thread::sleep(Duration::from_secs(4));
+    wait_for(&log, "session: FOCUSED", 2);
+    thread::sleep(Duration::from_secs(1));
     runtime.kill();
-    thread::sleep(Duration::from_secs(2));
+    wait_for(&log, "waiting for the headset to come back", 2);
     runtime.begin();
     let output = player.wait_with_output().unwrap();
-    succeeded(&output);
+    assert!(output.status.success(), "{}", fs::read_to_string(&log).unwrap());
     let figures = figures(&runtime.out().join("figures.json"));
     assert_eq!((&figures["sessions"], &figures["losses"]), (&3.into(), &2.into()), "{figures}");
     assert_eq!((&figures["frames"], &figures["graphics_errors"]), (&600.into(), &0.into()));

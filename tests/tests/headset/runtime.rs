@@ -20,7 +20,9 @@ pub enum Head {
     Wobbling,
     /// Held still, looking down at the table.
     Still,
-    /// The same, and the right controller pulls its trigger at the table.
+    /// The same, and the right controller points at the table.
+    Pointing,
+    /// The same, and it pulls its trigger.
     Selecting,
 }
 
@@ -32,6 +34,35 @@ pub fn folder() -> Option<PathBuf> {
         println!("skipped: no OpenXR runtime: `cargo xtask setup` makes one as root (HOLOPITCH_OPENXR_ROOT)");
     }
     folder
+}
+
+/// Through which extension the layer tells of its planes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Planes {
+    /// XR_EXT_plane_detection.
+    Detected,
+    /// XR_EXT_spatial_plane_tracking, and anchors through XR_EXT_spatial_anchor.
+    Tracked,
+}
+
+impl Planes {
+    fn folder(self) -> &'static str {
+        match self {
+            Self::Detected => "layer",
+            Self::Tracked => "layer-spatial",
+        }
+    }
+
+    fn manifest(self) -> String {
+        let extensions: &[&str] = match self {
+            Self::Detected => &["plane_detection"],
+            Self::Tracked => &["future", "spatial_entity", "spatial_plane_tracking", "spatial_anchor"],
+        };
+        let offered = extensions
+            .iter()
+            .map(|name| format!(r#"{{ "name": "XR_EXT_{name}", "extension_version": "1" }}"#));
+        LAYER_MANIFEST.replace("EXTENSIONS", &offered.collect::<Vec<_>>().join(", "))
+    }
 }
 
 /// A file beside the test programs: `target/debug/NAME`.
@@ -54,12 +85,15 @@ impl Runtime {
     /// Starts Monado and waits until it listens.
     pub fn start(root: PathBuf, head: Head) -> Self {
         let shared = tempfile::tempdir().expect("a folder");
-        for name in ["run", "out", "stream", "layer"] {
+        for name in ["run", "out", "stream", "layer", "layer-spatial"] {
             fs::create_dir(shared.path().join(name)).expect("a folder");
         }
         let layer = built("libfakeplanes.so");
         fs::copy(layer, shared.path().join("layer/libfakeplanes.so")).expect("the layer");
-        fs::write(shared.path().join("layer/fakeplanes.json"), LAYER_MANIFEST).expect("the layer's manifest");
+        let layers = [Planes::Detected, Planes::Tracked].map(|planes| (planes.folder(), planes.manifest()));
+        for (folder, manifest) in layers {
+            fs::write(shared.path().join(folder).join("fakeplanes.json"), manifest).expect("a manifest");
+        }
         let mut runtime = Self { root, shared, head, service: None };
         runtime.begin();
         runtime
@@ -74,7 +108,11 @@ impl Runtime {
         if self.head != Head::Wobbling {
             command.args(["--setenv", "P_OVERRIDE_ACTIVE_CONFIG", "remote", "--ro-bind"]);
             command.arg(env!("CARGO_BIN_EXE_remote_head")).arg("/opt/remote_head");
-            let argument = if self.head == Head::Selecting { "select" } else { "" };
+            let argument = match self.head {
+                Head::Wobbling | Head::Still => "",
+                Head::Pointing => "point",
+                Head::Selecting => "select",
+            };
             script += &format!(" && {{ /opt/remote_head {argument} > /mnt/run/head & }}");
         }
         script += " && exec monado-service < /tmp/in";
@@ -105,7 +143,7 @@ impl Runtime {
 
     /// `player xr STREAM` inside the folder. `/mnt/out` is [`out`](Self::out).
     pub fn player(&self, stream: &str, arguments: &[&str]) -> Command {
-        self.player_with(&[], stream, arguments)
+        self.player_with(Planes::Detected, &[], stream, arguments)
     }
 
     /// The same under Vulkan's validation layer, which writes to a file in [`out`](Self::out); with a planted mistake.
@@ -117,17 +155,24 @@ impl Runtime {
             ("VK_KHRONOS_VALIDATION_LOG_FILENAME", &log),
         ];
         environment.extend(planted.then_some(("FAKEPLANES_PLANT_VULKAN_ERROR", "1")));
-        self.player_with(&environment, stream, arguments)
+        self.player_with(Planes::Detected, &environment, stream, arguments)
     }
 
-    fn player_with(&self, environment: &[(&str, &str)], stream: &str, arguments: &[&str]) -> Command {
+    /// The same with planes of a kind and further environment.
+    pub fn player_with(
+        &self,
+        planes: Planes,
+        environment: &[(&str, &str)],
+        stream: &str,
+        arguments: &[&str],
+    ) -> Command {
         let mut command = self.inside();
         for (name, value) in environment {
             command.args(["--setenv", name, value]);
         }
         command.arg("--ro-bind").arg(built("player")).arg("/opt/player");
         command.args(["--setenv", "XR_RUNTIME_JSON", "/usr/share/openxr/1/openxr_monado.json"]);
-        command.args(["--setenv", "XR_API_LAYER_PATH", "/mnt/layer"]);
+        command.args(["--setenv", "XR_API_LAYER_PATH", &format!("/mnt/{}", planes.folder())]);
         command.args(["--setenv", "XR_ENABLE_API_LAYERS", "XR_APILAYER_HOLOPITCH_fakeplanes"]);
         command.args(["--setenv", "FAKEPLANES_LOSE_SESSION", "/mnt/out/lose"]);
         command.args(["/opt/player", "xr", stream]).args(arguments);
@@ -178,6 +223,19 @@ pub fn succeeded(output: &Output) {
     assert!(output.status.success(), "{}\n{}", text(&output.stdout), text(&output.stderr));
 }
 
+/// Waits until a file holds `text` so many times, or says what the file holds.
+pub fn wait_for(path: &Path, text: &str, times: usize) {
+    let begun = Instant::now();
+    loop {
+        let told = fs::read_to_string(path).unwrap_or_default();
+        if told.matches(text).count() >= times {
+            return;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(60), "no `{text}` ({times} times) in:\n{told}");
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
 /// The figures that the player wrote.
 pub fn figures(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&fs::read(path).expect("figures")).expect("JSON")
@@ -187,11 +245,11 @@ const LAYER_MANIFEST: &str = r#"{
   "file_format_version": "1.0.0",
   "api_layer": {
     "name": "XR_APILAYER_HOLOPITCH_fakeplanes",
-    "library_path": "./libfakeplanes.so",
+    "library_path": "/mnt/layer/libfakeplanes.so",
     "api_version": "1.0",
     "implementation_version": "1",
     "description": "A table for the tests",
-    "instance_extensions": [{ "name": "XR_EXT_plane_detection", "extension_version": "1" }]
+    "instance_extensions": [EXTENSIONS]
   }
 }
 "#;

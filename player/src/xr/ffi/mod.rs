@@ -8,6 +8,9 @@ pub(super) mod clock;
 pub(super) mod graphics;
 pub(super) mod passthrough;
 pub(super) mod planes;
+mod spatial;
+pub(super) mod spatial_anchor;
+pub(super) mod spatial_planes;
 
 use openxr::Entry;
 

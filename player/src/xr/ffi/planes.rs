@@ -14,18 +14,31 @@ const LEAST_AREA_M2: f32 = 0.05;
 /// Half the side of the box around the base space in which planes are looked for, metres.
 const REACH_M: f32 = 5.0;
 
-/// A plane as the extension reports it.
+/// Which axes of its pose span a plane; the third one is its normal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::xr) enum PlaneAxes {
+    /// x and z, with y as the normal (XrPlaneDetectorLocationEXT: "the x-z plane of the plane's coordinate system").
+    XZ,
+    /// x and y, with z as the normal (XrSpatialBounded2DDataEXT).
+    XY,
+}
+
+/// A plane as an extension reports it.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::xr) struct DetectedPlane {
     /// The runtime's name for it.
     pub(in crate::xr) id: u64,
-    /// Origin in the plane; its axes are told in [`super::super::planes`].
+    /// Middle of the extents.
     pub(in crate::xr) pose: Posef,
+    /// As the extension says.
+    pub(in crate::xr) axes: PlaneAxes,
     /// Full sizes along the plane's own two axes, metres.
     pub(in crate::xr) extents_m: [f32; 2],
     pub(in crate::xr) orientation: sys::PlaneDetectorOrientationEXT,
     pub(in crate::xr) meaning: sys::PlaneDetectorSemanticTypeEXT,
-    /// Corners in the plane's own two axes, metres.
+    /// Origin of the outline.
+    pub(in crate::xr) outline_pose: Posef,
+    /// Corners in the two axes of `outline_pose`, metres.
     pub(in crate::xr) outline_m: Vec<[f32; 2]>,
 }
 
@@ -141,9 +154,11 @@ impl<G> PlaneDetector<G> {
             Ok(DetectedPlane {
                 id: place.plane_id,
                 pose: place.pose,
+                axes: PlaneAxes::XZ,
                 extents_m: [place.extents.width, place.extents.height],
                 orientation: place.orientation,
                 meaning: place.semantic_type,
+                outline_pose: place.pose,
                 outline_m,
             })
         });
