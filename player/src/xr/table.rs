@@ -294,7 +294,7 @@ mod tests {
             preview.on.is_some() && (preview.opacity - 0.65).abs() < 1e-9 && scene.marks.handles.is_none()
         );
         assert!(table.is_settled());
-        steps(&mut table, hand(ray, true), 1);
+        steps(&mut table, hand(ray, true), 2);
         assert!(!table.is_settled());
         steps(&mut table, hand(ray, false), 100);
         let scene = table.scene(&follow);
@@ -306,6 +306,24 @@ mod tests {
         let scene = table.scene(&follow);
         assert!(scene.marks.handles.is_none());
         assert!(scene.standing.is_some_and(|match_| (match_.opacity - 0.35).abs() < 1e-9));
+    }
+
+    /// Controllers point all the time, also the one that lies beside the user: the other one's preview stands.
+    #[test]
+    fn a_second_controller_that_points_at_nothing_disturbs_no_preview() {
+        let place = DVec3::new(0.0, -0.5, -1.0);
+        let head = (DVec3::ZERO, DQuat::from_rotation_x(-0.45));
+        let hand = |ray| HandState { ray: Some((DVec3::ZERO, ray)), ..HandState::default() };
+        let mut table = Table::new(Pitch::default());
+        table.know(vec![table_at(place)], false, Duration::ZERO);
+        for hands in [[DVec3::Y, place.normalize()], [place.normalize(), DVec3::Y]] {
+            for step in 0..100 {
+                let now = Duration::from_millis(20 * step);
+                table.follow(head, hands.map(hand), [false; 2], DVec3::ZERO, now);
+            }
+            let scene = table.scene(&Follow::default());
+            assert!(scene.standing.is_some_and(|match_| match_.on.is_some() && match_.opacity > 0.6));
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Choosing a place: one surface is highlighted, and the match is previewed on it or, before any is known, in the air.
 
-use super::{Output, Phase, Placement, Preview, blend::Blend, float, hover, stand::Ground};
+use super::{Output, Phase, Placement, Pointer, Preview, Ray, blend::Blend, float, hover, stand::Ground};
 use crate::placement::{Surface, fit::fit};
 
 /// The fit is made anew for a viewer who has moved by this much, metres.
@@ -13,16 +13,24 @@ impl Placement {
         if !self.followed {
             return;
         }
-        let ray = self.rays[self.active as usize]
-            .or(self.rays[0])
-            .or(self.rays[1])
-            .or(self.viewer.filter(|_| self.options.gaze));
         let before = *before;
-        let highlighted = ray.and_then(|ray| hover::pointed_at(&self.surfaces, &ray, before));
+        let pointed_at = |ray: &Ray| hover::pointed_at(&self.surfaces, ray, before);
+        let by_hand = |pointer: Pointer| self.rays[pointer as usize].as_ref().and_then(pointed_at);
+        // Both hands may point all the time: the active one counts as long as it means a surface, else the other one.
+        let (active, highlighted) = if self.rays == [None, None] {
+            (self.active, self.viewer.filter(|_| self.options.gaze).as_ref().and_then(pointed_at))
+        } else {
+            let other = self.active.other();
+            match (by_hand(self.active), by_hand(other)) {
+                (None, Some(surface)) => (other, Some(surface)),
+                (surface, _) => (self.active, surface),
+            }
+        };
         let preview = match highlighted.and_then(|id| self.surfaces.get(&id)) {
             Some(surface) => Some(self.preview_on(surface, preview.as_ref())),
             None => self.preview_in_the_air(preview.as_ref()),
         };
+        self.active = active;
         self.phase = Phase::Choosing { highlighted, preview };
         if highlighted != before {
             self.say(Output::Highlight(highlighted));

@@ -33,6 +33,16 @@ pub enum Pointer {
     Right,
 }
 
+impl Pointer {
+    /// The hand on the other side.
+    pub(super) fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+}
+
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {

@@ -8,7 +8,6 @@ use crate::placement::TabletopPose;
 impl Placement {
     pub(super) fn point(&mut self, pointer: Pointer, ray: Ray) {
         self.rays[pointer as usize] = Some(ray);
-        self.active = pointer;
         if !self.followed {
             return;
         }
@@ -29,6 +28,11 @@ impl Placement {
         let Some(ray) = self.rays[pointer as usize].or(self.viewer.filter(|_| self.options.gaze)) else {
             return;
         };
+        if self.active != pointer && self.rays[pointer as usize].is_some() {
+            // The hand that selects means where it points itself.
+            self.active = pointer;
+            self.choose();
+        }
         match &mut self.phase {
             Phase::Choosing { preview, .. } => match preview.take() {
                 Some(Preview { ground, result: Ok(blend), .. }) => self.stand(ground, blend),
@@ -64,7 +68,7 @@ impl Placement {
         *grip = match *grip {
             // The other hand goes on alone.
             Grip::Both { .. } => {
-                let other = if pointer == Pointer::Left { Pointer::Right } else { Pointer::Left };
+                let other = pointer.other();
                 let at = self.rays[other as usize].and_then(|ray| manipulate::on_ground(ground, &ray));
                 at.map_or(Grip::None, |at_m| Grip::Drag {
                     pointer: other,

@@ -92,7 +92,7 @@ pub struct Placement {
     wish: Wish,
     surfaces: BTreeMap<SurfaceId, Surface>,
     viewer: Option<Ray>,
-    /// Left and right; and which one moved last.
+    /// Left and right; and which one means the place while one is chosen.
     rays: [Option<Ray>; 2],
     active: Pointer,
     followed: bool,
