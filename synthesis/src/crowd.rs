@@ -109,34 +109,57 @@ impl Crowd {
                 return Vec3::splat(if step < 0.5 { 0.07 } else { 0.13 });
             }
         }
+        // Who sits a row further down is in front: heads and shoulders reach over the feet of the next row.
+        let lower = self.person(along, up, row - 1, v + row_m, [place_m, row_m]);
+        lower.or_else(|| self.person(along, up, row, v, [place_m, row_m])).unwrap_or_else(|| {
+            let place = (along / place_m) as i32;
+            let taken = self.taken(place, row, along, up);
+            if taken {
+                return Vec3::splat(0.026);
+            }
+            let folded = if v < 0.45 { 0.75 } else { 0.4 };
+            let gap = if (along - (place as f32 + 0.5) * place_m).abs() > 0.24 { 0.45 } else { 1.0 };
+            linear(self.look.seats) * folded * gap
+        })
+    }
+
+    /// Whether somebody has taken a place. Empty ones come in patches.
+    fn taken(&self, place: i32, row: i32, along: f32, up: f32) -> bool {
+        let patch = noise::value(Vec2::new(along * 0.35, up * 0.5), self.seed ^ 51);
+        let empty = (1.0 - self.look.full).min(0.5);
+        noise::unit(place, row.rem_euclid(ROWS), self.seed ^ 32) <= self.look.full + 0.25 * patch * empty
+    }
+
+    /// The person of a row at a point `v` metres above their feet, if there is somebody.
+    fn person(&self, along: f32, up: f32, row: i32, v: f32, [place_m, row_m]: [f32; 2]) -> Option<Vec3> {
+        let row = row.rem_euclid(ROWS);
         let place = (along / place_m) as i32;
         let key = |salt: u32| noise::unit(place, row, self.seed ^ salt);
-        let u = along - (place as f32 + 0.5) * place_m + (key(31) - 0.5) * 0.16;
-        // Empty seats come in patches.
-        let patch = noise::value(Vec2::new(along * 0.35, up * 0.5), self.seed ^ 51);
-        if key(32) > self.look.full + 0.25 * patch * (1.0 - self.look.full).min(0.5) {
-            let folded = if v < 0.45 { 0.75 } else { 0.4 };
-            let gap = if u.abs() > 0.24 { 0.45 } else { 1.0 };
-            return linear(self.look.seats) * folded * gap;
+        if !self.taken(place, row, along, up) {
+            return None;
         }
-        let stands = noise::value(Vec2::new(along * 0.2, up * 0.2), self.seed ^ 61) > 0.55;
-        let tall = 0.90 + 0.18 * (key(33) - 0.5) + if stands { 0.14 } else { 0.0 };
-        let shade = 0.70 + 0.6 * key(34);
-        let from_head = Vec2::new(u, v - tall * 0.80);
-        if from_head.length_squared() < 0.0135 {
-            if from_head.y > 0.03 {
+        let u = along - (place as f32 + 0.5) * place_m + (key(31) - 0.5) * 0.20;
+        let stands = noise::value(Vec2::new(place as f32 * 0.11, row as f32 * 0.17), self.seed ^ 61) > 0.5;
+        let tall = row_m * (1.02 + 0.28 * (key(33) - 0.5)) + if stands { 0.18 } else { 0.0 };
+        let shade = 0.65 + 0.6 * key(34);
+        let from_head = Vec2::new(u * (0.95 + 0.2 * key(46)), (v - tall + 0.12) * 0.85);
+        if from_head.length_squared() < 0.0115 {
+            if from_head.y > 0.02 + 0.05 * (key(44) - 0.5) {
                 // Hair and hats on top, a face below.
-                return Vec3::splat(0.02 + 0.14 * key(43).powi(4));
+                return Some(Vec3::splat(0.02 + 0.14 * key(43).powi(4)));
             }
             let tone = key(35).powi(2);
-            return linear([0.86 - 0.5 * tone, 0.68 - 0.45 * tone, 0.58 - 0.42 * tone]) * shade;
+            return Some(linear([0.80 - 0.5 * tone, 0.62 - 0.42 * tone, 0.52 - 0.38 * tone]) * shade);
         }
-        let shoulders = 0.26 - 1.6 * (v - tall * 0.56).max(0.0);
-        if u.abs() < shoulders && v > 0.08 {
-            let fold = 0.50 + 0.40 * (v - 0.08) / 0.6;
-            return linear(self.coat(key(36), [key(37), key(38), key(39)])) * shade * fold;
+        let neck = tall - 0.24;
+        let shoulders = 0.21 + 0.05 * key(45) - 1.4 * (v - neck + 0.08).max(0.0);
+        // Now and then an arm is up.
+        let arm = key(47) > 0.93 && (u - 0.2).abs() < 0.05 && v > neck - 0.1 && v < tall + 0.12;
+        if (u.abs() < shoulders && v > 0.02 && v < neck + 0.12) || arm {
+            let fold = 0.45 + 0.45 * (v / neck).clamp(0.0, 1.0);
+            return Some(linear(self.coat(key(36), [key(37), key(38), key(39)])) * shade * fold);
         }
-        Vec3::splat(0.026)
+        None
     }
 
     fn coat(&self, choice: f32, random: [f32; 3]) -> Srgb {

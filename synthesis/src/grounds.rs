@@ -7,7 +7,7 @@ use rand::{Rng, seq::IndexedRandom};
 use crate::{
     crowd::CrowdLook,
     operator::Tripod,
-    outfit::Srgb,
+    outfit::{Srgb, linear},
     stadium::{Board, BoardRow, Roof, Side, Surroundings, Tier},
     turf::{Mowing, TurfLook},
 };
@@ -105,7 +105,7 @@ pub(crate) fn surroundings(
     let ground =
         if rng.random_bool(0.12) { rng.random_range(12.0..22.0) } else { rng.random_range(1.8..6.0f32) };
     let barrier_m =
-        if rng.random_bool(0.7) { rng.random_range(0.5..1.2) } else { rng.random_range(1.2..2.4f32) };
+        if rng.random_bool(0.85) { rng.random_range(0.5..1.2) } else { rng.random_range(1.2..2.4f32) };
     let two = rng.random_bool(0.6);
     let roofed = rng.random_bool(0.8);
     let first = Tier {
@@ -168,6 +168,8 @@ pub(crate) fn surroundings(
     let mut colours = vec![supporters[0], supporters[0], supporters[1]];
     colours.push(if rng.random_bool(0.5) { [0.9, 0.9, 0.92] } else { [0.1, 0.11, 0.16] });
     let grey = rng.random_range(0.03..0.22f32);
+    // Barriers and fascias are of concrete, or painted like the seats.
+    let painted = rng.random_bool(0.35);
     Surroundings {
         sides,
         boards,
@@ -183,7 +185,11 @@ pub(crate) fn surroundings(
             light: 0.5,
         },
         roof: Vec3::splat(rng.random_range(0.008..0.06)),
-        structure: Vec3::new(grey, grey, grey * rng.random_range(0.95..1.15)),
+        structure: if painted {
+            linear(seats) * 0.6
+        } else {
+            Vec3::new(grey, grey, grey * rng.random_range(0.95..1.15))
+        },
         sky: Vec3::ZERO,
     }
 }

@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::{
     SynthesisError,
     acts::Kind,
+    bystanders::Part,
     fixture::{Fixture, Member},
     outfit::Srgb,
     props::BALL_RADIUS_M,
@@ -79,6 +80,17 @@ pub struct FrameTruth {
     pub pitch_points: Vec<PitchPoint>,
     /// Everybody with at least one pixel of box in the picture.
     pub people: Vec<PersonFrame>,
+    /// People beside the pitch who take no part, seen or hidden: a detector may find them and is not wrong.
+    pub bystanders: Vec<BystanderFrame>,
+}
+
+/// Somebody beside the pitch in one frame.
+#[derive(Clone, Debug, Serialize)]
+pub struct BystanderFrame {
+    /// What the person does there.
+    pub part: Part,
+    /// Amodal box: left, top, right, bottom in pixels.
+    pub box_px: [f64; 4],
 }
 
 /// The ball in one frame.
@@ -201,7 +213,8 @@ pub fn measure(
     let ball = ball(&camera, scene, fixture.ball[frame].as_dvec3());
     let pitch_points = lines::points_in_picture(&camera, &fixture.stadium.pitch);
     let shot = fixture.film[frame].truth();
-    (FrameTruth { frame, shot, camera, ball, pitch_points, people }, maps)
+    let bystanders = bystanders(fixture, &camera, size);
+    (FrameTruth { frame, shot, camera, ball, pitch_points, people, bystanders }, maps)
 }
 
 /// The pixels of one person that nothing covers.
@@ -217,6 +230,17 @@ impl Visible {
         self.limits = Some([left.min(x), top.min(y), right.max(x), bottom.max(y)]);
         self.pixels += 1;
     }
+}
+
+fn bystanders(fixture: &Fixture, camera: &Camera, size: [usize; 2]) -> Vec<BystanderFrame> {
+    let last = DVec2::new(size[0] as f64 - 0.5, size[1] as f64 - 0.5);
+    let all = fixture.bystanders.iter().filter_map(|person| {
+        let [low, high] = projected_box(camera, person.solid.positions.iter().map(|p| p.as_dvec3()))?;
+        let in_picture = high.cmpgt(DVec2::splat(-0.5)).all() && low.cmplt(last).all();
+        in_picture
+            .then(|| BystanderFrame { part: person.part, box_px: rounded([low.x, low.y, high.x, high.y], 2) })
+    });
+    all.collect()
 }
 
 /// Smallest and largest pixel coordinates of points; `None` when one is behind the camera.
