@@ -14,7 +14,7 @@ use crate::{
     correspondences::clicked,
     fixture::{Fixture, FixtureOptions},
     operator::Platform,
-    render::{Exposure, Window},
+    render::{Exposure, Scene, Window},
     shots::{self, Shots, Take},
     shutter::Shutter,
     trajectories::Trajectories,
@@ -93,15 +93,25 @@ pub struct Synthesized {
 
 /// Renders a frame of a match: the picture that the broadcast shows.
 pub fn render_frame(fixture: &Fixture, frame: usize, seed: u64) -> Result<RgbImage, SynthesisError> {
+    render_scene(fixture, &fixture.scene(frame), frame, seed)
+}
+
+/// As [`render_frame`], with everybody already in place.
+fn render_scene(
+    fixture: &Fixture,
+    scene: &Scene<'_>,
+    frame: usize,
+    seed: u64,
+) -> Result<RgbImage, SynthesisError> {
     let shown = &fixture.film[frame];
     let beside = shots::beside(frame, fixture.frames());
-    let (scene, other) = (fixture.scene(frame), fixture.scene(beside));
     let open = fixture.chain.shutter * (beside as f32 - frame as f32);
+    let other = if open == 0.0 { None } else { Some(fixture.scene(beside)) };
     let take = |take: &Take, number: u64| {
         // Somebody may have put another camera in this one's place; that one stands still.
         let camera = if number == 0 { fixture.cameras[frame] } else { take.camera };
         let next = if camera == take.camera { take.next } else { camera };
-        let shutter = (open != 0.0).then_some(Shutter { other: &other, camera: &next, open });
+        let shutter = other.as_ref().map(|other| Shutter { other, camera: &next, open });
         let exposure = Exposure { side: fixture.chain.side, shutter, focus: take.focus };
         let size = [camera.width_px as usize, camera.height_px as usize];
         let light = scene.expose(&camera, Window { first: [0, 0], size }, &exposure);
@@ -182,8 +192,8 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
         let batch: Vec<_> = (first..(first + together).min(count))
             .into_par_iter()
             .map(|frame| {
-                let picture = render_frame(&fixture, frame, options.seed)?;
                 let scene = fixture.scene(frame);
+                let picture = render_scene(&fixture, &scene, frame, options.seed)?;
                 let (truth, maps) = truth::measure(&fixture, &scene, frame, options.maps);
                 let bodies = truth::stream_frame(&fixture, &scene, &truth, &reduced, &palette);
                 Ok((picture, truth, maps, bodies))

@@ -152,11 +152,13 @@ impl Crowd {
             return Some(linear([0.80 - 0.5 * tone, 0.62 - 0.42 * tone, 0.52 - 0.38 * tone]) * shade);
         }
         let neck = tall - 0.24;
-        let shoulders = 0.21 + 0.05 * key(45) - 1.4 * (v - neck + 0.08).max(0.0);
+        let shoulders = 0.17 + 0.05 * key(45) - 1.3 * (v - neck + 0.10).max(0.0);
         // Now and then an arm is up.
         let arm = key(47) > 0.93 && (u - 0.2).abs() < 0.05 && v > neck - 0.1 && v < tall + 0.12;
         if (u.abs() < shoulders && v > 0.02 && v < neck + 0.12) || arm {
-            let fold = 0.45 + 0.45 * (v / neck).clamp(0.0, 1.0);
+            // Folds, arms and what people hold break a coat into light and dark.
+            let creases = noise::value(Vec2::new(along, up) * 9.0, self.seed ^ 71);
+            let fold = (0.35 + 0.45 * (v / neck).clamp(0.0, 1.0)) * (1.0 + 0.55 * creases);
             return Some(linear(self.coat(key(36), [key(37), key(38), key(39)])) * shade * fold);
         }
         None
@@ -169,15 +171,19 @@ impl Crowd {
                 [(random[0] * self.look.colours.len() as f32) as usize % self.look.colours.len()];
         }
         match (choice - club) / (1.0 - club).max(1e-3) {
-            c if c < 0.45 => {
-                let grey = 0.10 + 0.22 * random[0];
+            c if c < 0.55 => {
+                let grey = 0.07 + 0.20 * random[0];
                 [grey, grey, grey * (1.0 + 0.25 * random[1])]
             }
-            c if c < 0.75 => {
-                let light = 0.35 + 0.5 * random[0];
+            c if c < 0.80 => {
+                let light = 0.30 + 0.45 * random[0];
                 [light, light * (0.95 + 0.05 * random[1]), light * (0.85 + 0.2 * random[2])]
             }
-            _ => random.map(|r| 0.12 + 0.55 * r),
+            _ => {
+                // Few clothes are of a pure colour.
+                let mean = (random[0] + random[1] + random[2]) / 3.0;
+                random.map(|r| 0.08 + 0.42 * (0.5 * mean + 0.5 * r))
+            }
         }
     }
 }

@@ -95,7 +95,7 @@ pub(crate) fn surroundings(
     let gaps = [rng.random_range(3.0..6.0f32), rng.random_range(4.0..8.0f32)];
     let led = rng.random_bool(0.5);
     let high = rng.random_range(0.75..1.05f32);
-    let second = rng.random_bool(0.35);
+    let second = rng.random_bool(0.22);
     let rows = |gap: f32| {
         let first = BoardRow { gap_m: gap, high_m: [0.0, high], led };
         let behind = BoardRow { gap_m: gap + 1.6, high_m: [high * 0.55, high * 1.75], led: false };
@@ -175,7 +175,7 @@ pub(crate) fn surroundings(
         boards,
         crowd: CrowdLook {
             colours,
-            supporters: rng.random_range(0.05..0.55),
+            supporters: rng.random_range(0.05..0.42),
             full: if rng.random_bool(0.12) {
                 rng.random_range(0.02..0.3)
             } else {

@@ -157,11 +157,14 @@ impl Raster {
             else {
                 continue;
             };
-            let low = a.min(b).min(c);
-            let high = a.max(b).max(c);
-            let (x0, x1) = (above(low.x).max(0), below(high.x).min(width - 1));
-            let (y0, y1) = (above(low.y).max(0), below(high.y).min(height - 1));
-            if x0 > x1 || y0 > y1 {
+            // Most triangles of a distant body lie between the samples: out with them first.
+            let (y0, y1) =
+                (above(a.y.min(b.y).min(c.y)).max(0), below(a.y.max(b.y).max(c.y)).min(height - 1));
+            if y0 > y1 {
+                continue;
+            }
+            let (x0, x1) = (above(a.x.min(b.x).min(c.x)).max(0), below(a.x.max(b.x).max(c.x)).min(width - 1));
+            if x0 > x1 {
                 continue;
             }
             let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);

@@ -316,7 +316,7 @@ fn patch(first: [usize; 2], drawn: &[Drawn], shader: &Shader<'_>, beyond_m: f32,
     patch
 }
 /// Whether a mesh can touch the grid, by the sphere round its box; a moving one gets some pixels more.
-fn may_be_in(camera: &Camera, grid: &Grid, positions: &[Vec3]) -> bool {
+pub(crate) fn may_be_in(camera: &Camera, grid: &Grid, positions: &[Vec3]) -> bool {
     let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
     for p in positions {
         (low, high) = (low.min(*p), high.max(*p));

@@ -6,7 +6,7 @@ use protocol::camera::Camera;
 
 use crate::{
     raster::{self, Grid, Raster, TILE},
-    render::{Scene, Window},
+    render::{Scene, Window, may_be_in},
     stadium::Shadow,
 };
 
@@ -59,6 +59,9 @@ fn add(scene: &Scene<'_>, camera: &Camera, window: Window, towards: Vec3, weight
             let p = *p - towards * (p.y.max(0.0) / towards.y.max(0.05));
             Vec3::new(p.x, 0.0, p.z)
         }));
+        if !may_be_in(camera, &raster.grid, &flat) {
+            continue;
+        }
         raster::project(camera, &raster.grid, &flat, &mut projected);
         raster.draw(&projected, triangles, 0);
     }

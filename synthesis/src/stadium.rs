@@ -317,8 +317,10 @@ impl Stadium {
         }
         let ground = nearest.depth;
         for side in &self.around.sides {
-            // Nothing stands over the grass: only what the camera looks across can be in front of it.
-            if !on_grass || origin.dot(side.outward) > side.line_m {
+            // Nothing stands over the grass: only what the camera looks across can be in front of it, and stands and
+            // boards are low enough to hide no more than its border.
+            let border = Vec3::new(place.x, 0.0, place.y).dot(side.outward) > side.line_m - 5.0;
+            if !on_grass || (border && origin.dot(side.outward) > side.line_m) {
                 side.meet(origin, direction, &mut nearest);
             }
         }

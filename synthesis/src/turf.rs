@@ -203,7 +203,9 @@ impl Turf {
         let wide = self.look.stripe_m;
         let wave = |place: f32, soft: f32| {
             // 1 at the middle of one stripe, 0 at the middle of the other.
-            let edge = ((place / wide).rem_euclid(2.0) - 1.0).abs();
+            // (Positive and small, so that cutting to a whole number rounds down.)
+            let pairs = place / wide * 0.5 + 500.0;
+            let edge = ((pairs - (pairs as i32) as f32) * 2.0 - 1.0).abs();
             ((edge - 0.5) / (soft / wide).max(0.04)).clamp(-0.5, 0.5)
         };
         match self.look.mowing {
