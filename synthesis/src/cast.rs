@@ -1,5 +1,6 @@
 //! Who plays: two teams, their goalkeepers and the officials of one match, each with a body, clothes and a movement.
 
+use glam::Vec3;
 use protocol::pitch::Pitch;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -7,12 +8,15 @@ use rayon::prelude::*;
 
 use crate::{
     SynthesisError,
+    acts::Kind,
     body::{BaseBody, Build},
+    course::ease,
     figure::{Detail, Figure, dress},
     motion::Motions,
     movement::{Habits, Movement},
     outfit::{Outfit, Sleeves},
     play::{self, Event},
+    rig,
     trajectories::{Path2, Role, Trajectories},
     wardrobe::Wardrobe,
 };
@@ -33,6 +37,8 @@ pub struct Cast {
     pub members: Vec<Member>,
     /// What the teams and officials wear.
     pub wardrobe: Wardrobe,
+    /// Middle of the ball at every frame: that of the paths, but in the hands of whoever throws it in.
+    pub ball: Vec<Vec3>,
 }
 
 impl Cast {
@@ -67,10 +73,37 @@ impl Cast {
             let movement = Movement::along(path, &paths.ball, rate_hz, &motions, habits, &own, &figure)?;
             Ok(Member { path: path.clone(), figure, movement })
         };
-        let members =
-            paths.people.par_iter().enumerate().map(member).collect::<Result<_, SynthesisError>>()?;
-        Ok(Self { members, wardrobe })
+        let members = paths
+            .people
+            .par_iter()
+            .enumerate()
+            .map(member)
+            .collect::<Result<Vec<Member>, SynthesisError>>()?;
+        let ball = in_hands(&paths.ball, &members, &events, rate_hz);
+        Ok(Self { members, wardrobe, ball })
     }
+}
+
+/// Seconds before a throw-in at which the ball is in both hands, and after it until it is back on its path.
+const HELD_S: [f32; 2] = [1.0, 0.2];
+
+/// The ball's path with the hands of those who throw it in.
+fn in_hands(ball: &[Vec3], members: &[Member], events: &[(usize, Event)], rate_hz: f32) -> Vec<Vec3> {
+    let mut held = ball.to_vec();
+    for (who, event) in events.iter().filter(|(_, event)| event.kind == Kind::ThrowIn) {
+        let frames = |seconds: f32| ((event.time_s + seconds) * rate_hz).max(0.0) as usize;
+        let member = &members[*who];
+        for k in frames(-HELD_S[0] - 0.3)..frames(HELD_S[1]).min(ball.len()) {
+            let step = &member.movement.steps[k];
+            let landmarks = rig::landmarks_at(&member.figure, &step.pose, step.hips_m);
+            // BlazePose's 19 and 20: the knuckles of both index fingers.
+            let between = step.placement.place((landmarks[19] + landmarks[20]) / 2.0);
+            let since = k as f32 / rate_hz - event.time_s;
+            let share = ease(since, -HELD_S[0] - 0.3, -HELD_S[0]) * (1.0 - ease(since, 0.0, HELD_S[1]));
+            held[k] = ball[k].lerp(between, share);
+        }
+    }
+    held
 }
 
 /// One person's own generator, so that nobody's looks depend on how many others there are.

@@ -25,6 +25,9 @@ const FINISH_HZ: f32 = 1.1;
 const STRETCH: f32 = 1.05;
 /// Seconds for which it is lifted then.
 const LIFT_S: f32 = 0.14;
+/// No foot is in the air or on the ground for less, seconds.
+const LEAST_SWING_S: f32 = 0.10;
+const LEAST_CONTACT_S: f32 = 0.05;
 /// The left foot comes down at this phase; at 0 it is furthest ahead.
 pub(crate) const TOUCHDOWN: f32 = 0.04;
 
@@ -203,6 +206,7 @@ impl Course {
         all.events = pace(&mut samples, &all.events, fine_hz, size, phase);
         all.samples = samples;
         all.force_contacts();
+        all.settle();
         all.lift_stretched();
         all
     }
@@ -219,6 +223,28 @@ impl Course {
         at(from)..at(to)
     }
 
+    /// Where the gait changes quickly a foot neither hops for a moment nor touches for one.
+    fn settle(&mut self) {
+        for side in [0, 1] {
+            for (state, least_s) in [(false, LEAST_SWING_S), (true, LEAST_CONTACT_S)] {
+                let least = (least_s * self.rate_hz) as usize;
+                let mut from = 0;
+                for k in 1..=self.samples.len() {
+                    let now = self.samples.get(k).map(|sample| sample.planted[side]);
+                    if now == Some(self.samples[from].planted[side]) {
+                        continue;
+                    }
+                    // What is cut off by an end of the course may be longer than it looks.
+                    let whole = from > 0 && now.is_some();
+                    if whole && self.samples[from].planted[side] == state && k - from < least {
+                        self.samples[from..k].iter_mut().for_each(|sample| sample.planted[side] = !state);
+                    }
+                    from = k;
+                }
+            }
+        }
+    }
+
     /// Sudden stops and turns leave a foot behind: it takes a step of its own.
     fn lift_stretched(&mut self) {
         let lift = (LIFT_S * self.rate_hz) as usize;
@@ -226,7 +252,7 @@ impl Course {
             let (mut gone, mut lifted) = (0.0, 0);
             for k in 1..self.samples.len() {
                 let (before, now) = (self.samples[k - 1], self.samples[k]);
-                gone += now.at.distance(before.at) + 0.5 * (now.yaw - before.yaw).abs();
+                gone += now.at.distance(before.at) + 0.8 * (now.yaw - before.yaw).abs();
                 if gone > STRETCH && now.planted[side] {
                     lifted = lift;
                 }

@@ -116,7 +116,8 @@ impl Fixture {
             paths.people.iter_mut().flat_map(|p| &mut p.xz).for_each(|p| *p *= Vec2::new(x, z));
             paths.ball.iter_mut().for_each(|b| *b *= Vec3::new(x, 1.0, z));
         }
-        let Cast { members, wardrobe } = Cast::new(&paths, rate, &pitch, options.seed)?;
+        let Cast { members, wardrobe, ball } = Cast::new(&paths, rate, &pitch, options.seed)?;
+        paths.ball = ball;
         let colours = wardrobe.teams.each_ref().map(|kit| kit.shirt);
         let Venue { stadium, mut tripod, net, style } = match options.setting {
             Setting::Plain => Venue::plain(options.seed, pitch, colours),

@@ -234,6 +234,7 @@ fn swing(
     let toes_bent = start.toes * (1.0 - ease(gone, 0.0, 0.25)) > 0.05;
     for _ in 0..2 {
         legs.bend(pose, side, &Foot { ankle, turn: own.turn });
+        limits::keep_thigh(pose, Legs::hip_joint(side));
         let back = legs.shank(pose, side).inverse();
         let mut turn = own_joint.slerp(back * start.turn, (1.0 - ease(gone, 0.0, 0.35)) * (1.0 - loose));
         turn = turn.slerp(back * finish.turn, ease(gone, 0.65, 1.0) * (1.0 - loose));

@@ -19,20 +19,20 @@ fn limb(flex: f32, out: f32, twist: f32, left: bool) -> Quat {
 
 /// Both arms and legs of one side, from shoulder and hip outwards.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Side {
+struct Side {
     /// Flexion forwards, outwards, twist.
-    pub(crate) thigh: [f32; 3],
-    pub(crate) knee: f32,
+    thigh: [f32; 3],
+    knee: f32,
     /// Positive points the toes down.
-    pub(crate) ankle: f32,
+    ankle: f32,
     /// Flexion forwards, outwards, twist.
-    pub(crate) arm: [f32; 3],
-    pub(crate) elbow: f32,
+    arm: [f32; 3],
+    elbow: f32,
 }
 
 /// A pose of both sides; the trunk leans forwards by `lean`, bends to the right by `sway`, the hips turn left by `turn`
 /// and the chest the other way.
-pub(crate) fn assemble(left: Side, right: Side, lean: f32, sway: f32, turn: f32) -> Pose {
+fn assemble(left: Side, right: Side, lean: f32, sway: f32, turn: f32) -> Pose {
     let mut pose = Pose::default();
     *pose.joint(Joint::Pelvis) = Quat::from_rotation_y(turn) * Quat::from_rotation_x(lean * 0.35);
     *pose.joint(Joint::Chest) =

@@ -122,6 +122,12 @@ impl Legs {
         pelvis * thigh * calf
     }
 
+    /// The joint between pelvis and thigh of one side.
+    #[must_use]
+    pub fn hip_joint(side: usize) -> Joint {
+        THIGHS[side]
+    }
+
     /// The joint between shank and foot of one side.
     #[must_use]
     pub fn ankle_joint(side: usize) -> Joint {

@@ -45,6 +45,7 @@ pub mod play;
 pub mod props;
 pub mod raster;
 pub mod rays;
+pub mod recordings;
 pub mod render;
 pub mod rig;
 pub mod sensor;

@@ -60,6 +60,16 @@ pub fn keep(pose: &mut Pose) {
     }
 }
 
+/// Brings a thigh back into range; knee and foot go with it.
+pub(crate) fn keep_thigh(pose: &mut Pose, thigh: Joint) {
+    let now = flexion(pose, thigh);
+    let missing = now.clamp(THIGH[0] + 0.03, THIGH[1] - 0.03) - now;
+    if missing != 0.0 {
+        let rotation = pose.joint(thigh);
+        *rotation = Quat::from_rotation_x(-missing) * *rotation;
+    }
+}
+
 /// The first joint out of range: its name and angle in degrees.
 #[must_use]
 pub fn broken(pose: &Pose) -> Option<(Joint, f32)> {

@@ -290,4 +290,4 @@ impl Gaits<'_> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

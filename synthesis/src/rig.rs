@@ -150,6 +150,14 @@ pub fn pose_at(figure: &Figure, pose: &Pose, hips_m: f32) -> Posed {
     lifted(figure, skeleton, posed, hips_m)
 }
 
+/// The landmarks alone of [`pose_at`].
+#[must_use]
+pub fn landmarks_at(figure: &Figure, pose: &Pose, hips_m: f32) -> Vec<Vec3> {
+    let mut skeleton = Skeleton::new(&figure.body, &figure.parents, pose);
+    skeleton.lift(hips_m);
+    figure.landmarks.iter().map(|&(bone, rest)| skeleton.carry(bone, rest)).collect()
+}
+
 fn skinned(figure: &Figure, pose: &Pose) -> (Skeleton, Posed) {
     let skeleton = Skeleton::new(&figure.body, &figure.parents, pose);
     let mut posed = Posed {
@@ -210,6 +218,14 @@ impl Probes {
     pub fn lowest_m(&self, figure: &Figure, pose: &Pose) -> f32 {
         let skeleton = Skeleton::new(&figure.body, &figure.parents, pose);
         self.vertices.iter().map(|vertex| carried(&skeleton, vertex).1.y).fold(f32::MAX, f32::min)
+    }
+}
+
+impl Placement {
+    /// A point of the person's frame in the world.
+    #[must_use]
+    pub fn place(&self, point: Vec3) -> Vec3 {
+        Mat3::from_rotation_y(self.yaw) * point + self.anchor_m
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::SynthesisError;
+use crate::{SynthesisError, recordings};
 
 /// What somebody does on the pitch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,7 +48,8 @@ const MOST_PEOPLE: usize = 100;
 const MOST_SAMPLES: usize = 1_000_000;
 
 impl Trajectories {
-    /// Reads a JSON file (see `assets/demo/README.md` for the form).
+    /// Reads a JSON file (see `assets/demo/README.md` for the form), or a table of [`crate::recordings`] whose name ends
+    /// in `.csv`.
     pub fn open(path: &Path) -> Result<Self, SynthesisError> {
         let bytes = std::fs::read(path).map_err(|source| SynthesisError::Io {
             path: path.to_owned(),
@@ -56,7 +57,11 @@ impl Trajectories {
             source,
         })?;
         let broken = |reason: String| SynthesisError::Asset { what: path.display().to_string(), reason };
-        let all: Self = serde_json::from_slice(&bytes).map_err(|error| broken(error.to_string()))?;
+        let all: Self = if path.extension().is_some_and(|extension| extension == "csv") {
+            recordings::last_row(&String::from_utf8_lossy(&bytes), &path.display().to_string())?
+        } else {
+            serde_json::from_slice(&bytes).map_err(|error| broken(error.to_string()))?
+        };
         let samples = all.ball.len();
         let sizes = (2..=MOST_SAMPLES).contains(&samples) && (1..=MOST_PEOPLE).contains(&all.people.len());
         if !sizes || all.people.iter().any(|p| p.xz.len() != samples) {
