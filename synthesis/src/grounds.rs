@@ -51,7 +51,7 @@ pub(crate) fn turf(rng: &mut impl Rng) -> TurfLook {
     TurfLook {
         grass,
         mowing,
-        contrast: rng.random_range(0.04..0.26),
+        contrast: rng.random_range(0.06..0.36),
         // Stripes usually divide the penalty area's 16.5 m or the five metres and a half of the goal area.
         stripe_m: *[3.0, 4.5, 5.25, 5.5, 5.5, 8.25, 9.0].choose(rng).unwrap_or(&5.5),
         wear: rng.random_range(0.0..1.0f32).powi(2) * 0.9,
