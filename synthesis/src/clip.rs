@@ -143,7 +143,8 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
     let paths = match &options.trajectories {
         Some(path) => Trajectories::open(path)?,
         None => {
-            Trajectories::generated(options.seed, f64::from(options.frames) / f64::from(FRAME_RATE) + 1.0)
+            let seconds = f64::from(options.frames) / f64::from(FRAME_RATE) + options.start_seconds.max(0.0);
+            Trajectories::generated(options.seed, seconds + 1.0)
         }
     };
     let fixture = Fixture::new(
@@ -187,7 +188,8 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
         },
     )?;
     let (mut done, mut in_view) = (0, 0);
-    let together = rayon::current_num_threads().max(1);
+    // Several frames for each thread, so that none waits long for the slowest.
+    let together = 4 * rayon::current_num_threads().max(1);
     for first in (0..count).step_by(together) {
         let batch: Vec<_> = (first..(first + together).min(count))
             .into_par_iter()

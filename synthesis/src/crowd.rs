@@ -113,19 +113,19 @@ impl Crowd {
         let lower = self.person(along, up, row - 1, v + row_m, [place_m, row_m]);
         lower.or_else(|| self.person(along, up, row, v, [place_m, row_m])).unwrap_or_else(|| {
             let place = (along / place_m) as i32;
-            let taken = self.taken(place, row, along, up);
+            let taken = self.taken(place, row);
             if taken {
                 return Vec3::splat(0.026);
             }
             let folded = if v < 0.45 { 0.75 } else { 0.4 };
             let gap = if (along - (place as f32 + 0.5) * place_m).abs() > 0.24 { 0.45 } else { 1.0 };
-            linear(self.look.seats) * folded * gap
+            linear(self.look.seats) * (0.6 * folded * gap)
         })
     }
 
     /// Whether somebody has taken a place. Empty ones come in patches.
-    fn taken(&self, place: i32, row: i32, along: f32, up: f32) -> bool {
-        let patch = noise::value(Vec2::new(along * 0.35, up * 0.5), self.seed ^ 51);
+    fn taken(&self, place: i32, row: i32) -> bool {
+        let patch = noise::value(Vec2::new(place as f32 * 0.19, row as f32 * 0.43), self.seed ^ 51);
         let empty = (1.0 - self.look.full).min(0.5);
         noise::unit(place, row.rem_euclid(ROWS), self.seed ^ 32) <= self.look.full + 0.25 * patch * empty
     }
@@ -135,7 +135,7 @@ impl Crowd {
         let row = row.rem_euclid(ROWS);
         let place = (along / place_m) as i32;
         let key = |salt: u32| noise::unit(place, row, self.seed ^ salt);
-        if !self.taken(place, row, along, up) {
+        if !self.taken(place, row) {
             return None;
         }
         let u = along - (place as f32 + 0.5) * place_m + (key(31) - 0.5) * 0.20;

@@ -349,3 +349,31 @@ impl Stadium {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::venue::Venue;
+
+    #[test]
+    fn a_roof_shades_the_pitch_up_to_where_its_edge_projects() {
+        let mut stadium = Venue::plain(1, Pitch::default(), [[0.9; 3], [0.1; 3]]).stadium;
+        let towards = Vec3::new(0.7, 0.5, 0.1).normalize();
+        stadium.lights.lamps = vec![(towards, Vec3::ONE)];
+        stadium.sunny = true;
+        let roof = Roof { edge_m: 3.0, height_m: 22.0, deep_m: 30.0, half_m: 60.0 };
+        let side = &mut stadium.around.sides[1];
+        side.roof = Some(roof);
+        let edge = side.line_m + side.foot_m + roof.edge_m - roof.height_m * towards.x / towards.y;
+        assert!(edge.abs() < 50.0, "the edge of the shade lies on the pitch");
+        let sun = |x: f32, y: f32| stadium.sun_at(Vec3::new(x, y, 4.0));
+        assert_eq!((sun(edge - 1.0, 0.0), sun(edge + 1.0, 0.0)), (1.0, 0.0));
+        assert!((0.2..0.8).contains(&sun(edge, 0.0)), "soft at the edge");
+        // Somebody's head is in the sun a little longer than the feet.
+        assert!(sun(edge + 1.0, 1.8) > 0.9);
+        let light = |x: f32| stadium.lights_at(Vec3::new(x, 1.0, 4.0)).lamps[0].1.y;
+        assert!(light(edge - 4.0) > 0.99 && light(edge + 4.0) < 0.01);
+        stadium.sunny = false;
+        assert_eq!(stadium.sun_at(Vec3::new(edge + 1.0, 0.0, 4.0)), 1.0);
+    }
+}
