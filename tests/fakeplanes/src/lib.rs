@@ -12,6 +12,7 @@ mod layer;
 mod planes;
 mod planted;
 mod room;
+mod snapshots;
 mod spatial;
 
 use std::{ffi::c_char, ptr};

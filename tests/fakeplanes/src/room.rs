@@ -20,7 +20,7 @@ use openxr_sys::{
 
 use crate::{
     layer::{below, instance},
-    spatial,
+    snapshots, spatial,
 };
 
 /// Where LOCAL goes, in its old frame: half a metre to the right, turned by 0.4 radians about y.
@@ -119,7 +119,7 @@ unsafe extern "system" fn poll_event(instance: Instance, buffer: *mut EventDataB
         if let Ok(mut origin) = ORIGIN.lock() {
             *origin = Some(RECENTRED);
         }
-        spatial::frame_moved(RECENTRED);
+        snapshots::frame_moved(RECENTRED);
         return Result::SUCCESS;
     }
     // SAFETY: a live instance and a C string.

@@ -49,6 +49,7 @@ fn both_eyes_see_the_match_on_the_runtimes_table() {
     succeeded(&runtime.player("/mnt/stream", &[&arguments[..], &script].concat()).output().unwrap());
     let figures = figures(&runtime.out().join("figures.json"));
     assert_eq!(figures["plane_source"], "XR_EXT_plane_detection");
+    assert_eq!(figures["anchor"], "STAGE");
     assert_eq!((&figures["planes"], &figures["on_a_plane"]), (&2.into(), &true.into()), "{figures}");
     let eye = |name: &str| image::open(runtime.out().join("eyes").join(name)).unwrap().into_rgba8();
     let (left, right) = (eye("left.png"), eye("right.png"));
