@@ -96,7 +96,7 @@ fn still(figure: &Figure, pose: &Pose, place: &Placement, coat: Srgb, trousers: 
             Material::Shirt | Material::Sleeve => coat,
             Material::Shorts | Material::Sock => trousers,
             Material::Hair => figure.outfit.hair.map_or(figure.outfit.skin, |hair| hair.colour),
-            Material::Boot => [0.08, 0.08, 0.09],
+            Material::Boot | Material::Glove => [0.08, 0.08, 0.09],
             _ => figure.outfit.skin,
         };
         triangle.iter().for_each(|&v| colour_of[v as usize] = linear(colour));

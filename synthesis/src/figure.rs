@@ -22,6 +22,7 @@ pub enum Material {
     Shorts,
     Sock,
     Boot,
+    Glove,
 }
 
 /// One vertex of a figure.
@@ -346,7 +347,7 @@ pub fn dress(base: &BaseBody, body: ShapedBody, outfit: Outfit, detail: Detail) 
     };
     let bare = if outfit.gloves.is_some() {
         let [gloves, bare] = bare.split(|v| lines.glove(v));
-        figure.add(gloves.inflated(|_| 0.009 * scale), Material::Skin);
+        figure.add(gloves.inflated(|_| 0.009 * scale), Material::Glove);
         bare
     } else {
         bare

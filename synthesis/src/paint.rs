@@ -135,6 +135,11 @@ pub fn albedo(figure: &Figure, point: &SurfacePoint) -> Vec3 {
                 linear(kit.socks)
             }
         }
+        Material::Glove => {
+            let colour = linear(outfit.gloves.unwrap_or(outfit.skin));
+            // The strap round the wrist.
+            if point.hem_m < 0.035 { colour * 0.45 } else { colour }
+        }
         Material::Boot => {
             let sole = figure.body.head(Bone::FootL).y - rest.y > 0.070;
             if sole { linear([0.12, 0.12, 0.12]) } else { linear(outfit.boots) }
@@ -147,14 +152,6 @@ fn skin(figure: &Figure, rest: Vec3) -> Vec3 {
     let base = linear(outfit.skin);
     let head = figure.body.head(Bone::Head);
     let p = rest - head;
-    if let Some(glove) = outfit.gloves {
-        let [_, elbow, wrist] =
-            crate::body::ARMS[usize::from(rest.x < 0.0)].map(|bone| figure.body.head(bone));
-        let beyond = (rest - wrist).dot((wrist - elbow).normalize_or(Vec3::X));
-        if beyond > -0.05 && rest.distance(wrist) < 0.3 {
-            return linear(glove) * if beyond < -0.015 { 0.45 } else { 1.0 };
-        }
-    }
     let mut colour = base;
     if p.y > -0.06 && p.z > 0.05 && p.x.abs() < 0.08 {
         // Sockets and brows, and the mouth: dark at a distance, they make a face read as one.

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// The materials in the order of the palette's columns.
-const MATERIALS: [Material; 8] = [
+const MATERIALS: [Material; 9] = [
     Material::Skin,
     Material::Hair,
     Material::Eye,
@@ -30,6 +30,7 @@ const MATERIALS: [Material; 8] = [
     Material::Shorts,
     Material::Sock,
     Material::Boot,
+    Material::Glove,
 ];
 
 /// Pixels of one colour in the palette.
@@ -53,6 +54,7 @@ fn colour_of(figure: &Figure, material: Material) -> Srgb {
         Material::Shorts => kit.shorts,
         Material::Sock => kit.socks,
         Material::Boot => outfit.boots,
+        Material::Glove => outfit.gloves.unwrap_or(outfit.skin),
     }
 }
 
