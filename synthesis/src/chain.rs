@@ -49,7 +49,7 @@ impl Chain {
         let mut gain = || 1.0 + rng.random_range(-0.04..0.04f32);
         let white = [gain(), 1.0, gain()];
         // The iris is set on the grass; somebody sets it, so not always alike.
-        let exposure = rng.random_range(0.86..1.18) * 1.04 / stadium.level_light().max(0.05);
+        let exposure = rng.random_range(0.90..1.32) * 1.04 / stadium.level_light().max(0.05);
         // Blur is given for 720 lines: larger pictures of the same lens are softer in pixels.
         let lines = height as f32 / 720.0;
         let sensor = Sensor {
@@ -58,7 +58,8 @@ impl Chain {
             exposure,
             white,
             saturation: rng.random_range(0.85..1.2),
-            noise: rng.random_range(0.002..0.014),
+            // Most productions are quiet, and encoders take what is left.
+            noise: 0.001 + 0.012 * rng.random_range(0.0..1.0f32).powi(2),
             fringe: if rng.random_bool(0.5) { rng.random_range(-0.0009..0.0009) } else { 0.0 },
             vignette: rng.random_range(0.0..0.14),
             jpeg: None,
@@ -86,7 +87,7 @@ mod tests {
             let chain = Chain::new(Setting::Drawn, seed, &venue.stadium, (1280, 720));
             assert_eq!(chain, Chain::new(Setting::Drawn, seed, &venue.stadium, (1280, 720)));
             let level = chain.sensor.exposure * venue.stadium.level_light();
-            assert!((0.8..1.3).contains(&level), "seed {seed}: {level}");
+            assert!((0.8..1.4).contains(&level), "seed {seed}: {level}");
             assert!((0.049..=0.5).contains(&chain.shutter));
             shutters.push(chain.shutter);
         }

@@ -35,7 +35,7 @@ pub(crate) fn light(rng: &mut impl Rng) -> Sky {
                 lights,
                 sunny: false,
                 above: Vec3::new(0.006, 0.008, 0.014),
-                stands: rng.random_range(0.25..0.6),
+                stands: rng.random_range(0.3..0.75),
             }
         }
         // Lamps along the roofs: light from all sides, hardly a shadow.
@@ -47,7 +47,7 @@ pub(crate) fn light(rng: &mut impl Rng) -> Sky {
                 lights,
                 sunny: false,
                 above: Vec3::new(0.006, 0.008, 0.014),
-                stands: rng.random_range(0.25..0.65),
+                stands: rng.random_range(0.3..0.8),
             }
         }
         // Sun.
@@ -70,7 +70,7 @@ pub(crate) fn light(rng: &mut impl Rng) -> Sky {
                 lights,
                 sunny: true,
                 above: Vec3::new(0.42, 0.58, 0.85),
-                stands: rng.random_range(0.25..0.5),
+                stands: rng.random_range(0.3..0.7),
             }
         }
         // Clouds.
@@ -89,7 +89,7 @@ pub(crate) fn light(rng: &mut impl Rng) -> Sky {
                 lights,
                 sunny: false,
                 above: Vec3::new(0.72, 0.76, 0.80),
-                stands: rng.random_range(0.35..0.7),
+                stands: rng.random_range(0.4..0.85),
             }
         }
     }

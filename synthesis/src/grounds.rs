@@ -98,7 +98,7 @@ pub(crate) fn surroundings(
     let second = rng.random_bool(0.22);
     let rows = |gap: f32| {
         let first = BoardRow { gap_m: gap, high_m: [0.0, high], led };
-        let behind = BoardRow { gap_m: gap + 1.6, high_m: [high * 0.55, high * 1.75], led: false };
+        let behind = BoardRow { gap_m: gap + 1.6, high_m: [high * 0.9, high * 1.8], led: false };
         if second { vec![first, behind] } else { vec![first] }
     };
     // Usually a few metres of ground behind the boards; now and then a running track.

@@ -80,8 +80,8 @@ pub struct Play<'a> {
     pub size_px: (u32, u32),
 }
 
-/// Players are drawn between these heights, as shares of the picture's height (35 and 150 px of 720).
-const PLAYER_SHARES: [f64; 2] = [0.049, 0.208];
+/// Players are drawn between these heights, as shares of the picture's height (25 and 150 px of 720).
+const PLAYER_SHARES: [f64; 2] = [0.035, 0.208];
 
 impl Play<'_> {
     /// Where the play is: the ball, and the people near it, on the ground.

@@ -157,12 +157,12 @@ fn platform(rng: &mut impl Rng, pitch: &Pitch) -> Tripod {
         if rng.random_bool(0.7) { rng.random_range(-2.0..2.0) } else { rng.random_range(-14.0..14.0) };
     Tripod {
         position: DVec3::new(aside, height, back),
-        // Players of 42 to 80 px at 720 lines at the middle of the picture, with scouts' wide cameras down to 35; the zoom
-        // takes it from there.
-        player_share: if rng.random_bool(0.2) {
-            rng.random_range(0.049..0.058)
-        } else {
+        // Players of 42 to 80 px at 720 lines at the middle of the picture; the zoom takes it from there. One camera in
+        // three shows both teams whole, as tacticians want it.
+        player_share: if rng.random_bool(0.67) {
             rng.random_range(0.058..0.110)
+        } else {
+            rng.random_range(0.036..0.058)
         },
         tighter: rng.random_range(1.0..1.7),
         reaction_s: rng.random_range(0.10..0.28),

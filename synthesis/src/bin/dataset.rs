@@ -8,7 +8,7 @@ use synthesis::{
 };
 
 const USAGE: &str = "usage: dataset depth  --out DIR --count N [--seed S] [--split train|validation|test] [--motions FILE] [--shard N] [--height LOW..HIGH]
-       dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--maps yes|no]
+       dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--maps yes|no] [--main-only yes|no]
 
 depth writes shard-NNNN/{crops.npy, mask.npy, offset_mm.npy, meta.jsonl}: rendered players for the depth network.
 frames writes images/, labels/ (YOLO: ball, goalkeeper, player, referee), frames.jsonl and maps/: whole pictures.
@@ -65,6 +65,7 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
         split: Split::Train,
         size_px: (1280, 720),
         maps: true,
+        main_only: false,
     };
     while let Some(name) = arguments.next() {
         let value = arguments.next()?;
@@ -74,6 +75,7 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
             "--seed" => options.seed = value.parse().ok()?,
             "--split" => options.split = split(&value)?,
             "--maps" => options.maps = value == "yes",
+            "--main-only" => options.main_only = value == "yes",
             "--size" => {
                 let (width, height) = value.split_once('x')?;
                 options.size_px = (width.parse().ok()?, height.parse().ok()?);

@@ -16,6 +16,7 @@ use crate::{
     SynthesisError,
     clip::{FRAME_RATE, render_frame},
     fixture::{Fixture, FixtureOptions},
+    shots::{Shot, ShotKind, Shots},
     trajectories::{Role, Trajectories},
     truth::{self, FrameTruth, PersonTruth, put},
 };
@@ -47,6 +48,8 @@ pub struct FrameOptions {
     pub size_px: (u32, u32),
     /// Whether the maps (people, lines, first and last surfaces) are written too.
     pub maps: bool,
+    /// Whether only main cameras are shown; else one match in eight is seen from high behind a goal, one in close-ups.
+    pub main_only: bool,
 }
 
 /// One line of `frames.jsonl`.
@@ -109,16 +112,24 @@ fn one_match(
 ) -> Result<Vec<u8>, SynthesisError> {
     let seed = match_seed(options, index);
     let frames = (MATCH_S * f64::from(FRAME_RATE)) as usize;
-    let fixture = Fixture::new(
+    let kind = match index % 8 {
+        6 if !options.main_only => ShotKind::HighBehind,
+        7 if !options.main_only => ShotKind::CloseUp,
+        _ => ShotKind::Main,
+    };
+    let mut fixture = Fixture::new(
         &Trajectories::generated(seed, MATCH_S + 1.0),
         &FixtureOptions {
             seed,
             frames,
             rate_hz: f64::from(FRAME_RATE),
             size_px: options.size_px,
+            shots: Shots(vec![Shot { kind, frames: 0, dissolve: 0 }]),
             ..FixtureOptions::default()
         },
     )?;
+    // Single pictures go through no video encoder: blocks and lost colour stand for it.
+    fixture.chain.sensor.jpeg = Some(rng(seed, &[0xF4C]).random_range(30..85));
     let everybody = truth::people_truth(&fixture.members);
     let mut rng = rng(seed, &[0xF4B]);
     let mut lines = Vec::new();
@@ -200,6 +211,7 @@ mod tests {
                 split,
                 size_px: (320, 180),
                 maps: true,
+                main_only: false,
             };
             broadcast_frames(&options, |_| ()).unwrap();
             let read = |file: &str| std::fs::read(options.out.join(file)).unwrap();
