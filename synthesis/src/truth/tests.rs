@@ -8,6 +8,7 @@ use super::*;
 use crate::{
     dataset::plane_depth,
     fixture::FixtureOptions,
+    operator::Platform,
     raster::{self, Raster},
     trajectories::Trajectories,
 };
@@ -22,6 +23,8 @@ fn measured() -> &'static (Fixture, FrameTruth, Maps) {
             rate_hz: 25.0,
             size_px: (640, 360),
             start_seconds: 0.5,
+            // Near enough that lines and wrists are about a pixel wide.
+            platform: Some(Platform { position_m: DVec3::new(0.0, 17.0, 62.0), player_px: Some(32.0) }),
             ..FixtureOptions::default()
         };
         let fixture = Fixture::new(&Trajectories::generated(5, 2.0), &options).unwrap();
