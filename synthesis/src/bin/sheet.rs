@@ -103,7 +103,7 @@ fn actions(options: &Options) -> Result<(), SynthesisError> {
         ("run", 5.0, 0.0),
         ("sprint", 8.0, 0.0),
         ("sideways", 1.6, 1.57),
-        ("backwards", 1.6, 3.14),
+        ("backwards", 1.6, std::f32::consts::PI),
         ("keeper", 0.8, 1.57),
     ];
     let draw =

@@ -118,7 +118,7 @@ fn a_shelf_hides_the_match_and_its_own_table_does_not() {
         marks: Marks::default(),
     };
     let free = covered(&seen(&gpu, Sight::Room, &[], &scene(None)));
-    assert_eq!(covered(&seen(&gpu, Sight::Room, &[table.clone()], &scene(None))), free);
+    assert_eq!(covered(&seen(&gpu, Sight::Room, std::slice::from_ref(&table), &scene(None))), free);
     let hidden = covered(&seen(&gpu, Sight::Room, &[table.clone(), shelf.clone()], &scene(None)));
     assert!(free > 4000 && hidden * 4 < free * 3, "{hidden} of {free} px");
     // Where the room is not seen nothing of it hides.

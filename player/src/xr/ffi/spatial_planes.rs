@@ -13,6 +13,9 @@ use super::{
 };
 use crate::xr::XrError;
 
+/// A polygon in the plane of its pose, metres.
+type Outline = (Posef, Vec<[f32; 2]>);
+
 const CAPABILITY: sys::SpatialCapabilityEXT = sys::SpatialCapabilityEXT::PLANE_TRACKING;
 /// Told by every runtime that tracks planes.
 const ALWAYS: [sys::SpatialComponentTypeEXT; 2] =
@@ -126,7 +129,7 @@ impl<G> PlaneTracker<G> {
             .collect())
     }
 
-    fn outlines(&self, snapshot: &Snapshot<G>) -> Result<BTreeMap<u64, (Posef, Vec<[f32; 2]>)>, XrError> {
+    fn outlines(&self, snapshot: &Snapshot<G>) -> Result<BTreeMap<u64, Outline>, XrError> {
         if !self.components.contains(&OUTLINE) {
             return Ok(BTreeMap::new());
         }
