@@ -17,7 +17,7 @@ const REACH_M: f32 = 5.0;
 /// Which axes of its pose span a plane; the third one is its normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::xr) enum PlaneAxes {
-    /// x and z, with y as the normal (XrPlaneDetectorLocationEXT: "the x-z plane of the plane's coordinate system").
+    /// x and z, with y as the normal (XrPlaneDetectorLocationEXT: the plane's extents run along x and z of its pose).
     XZ,
     /// x and y, with z as the normal (XrSpatialBounded2DDataEXT).
     XY,
