@@ -86,7 +86,8 @@ impl Camera {
         self.rotation.row(2)
     }
 
-    /// The pixel a world point lands on, inside the picture or not; `None` behind the camera.
+    /// The pixel a world point lands on, inside the picture or not; `None` behind the camera, and so far off the axis that
+    /// a negative `k1` would fold the point back into the picture, which no lens does.
     #[must_use]
     pub fn project(&self, world: DVec3) -> Option<DVec2> {
         let p = self.to_camera(world);
@@ -94,7 +95,9 @@ impl Camera {
             return None;
         }
         let n = p.truncate() / p.z;
-        Some(n * (1.0 + self.k1 * n.length_squared()) * self.focal_px + self.centre_px())
+        let bend = self.k1 * n.length_squared();
+        // The distorted radius r(1 + k1 r²) grows only while its derivative 1 + 3 k1 r² is positive.
+        (3.0 * bend > -1.0).then(|| n * (1.0 + bend) * self.focal_px + self.centre_px())
     }
 
     /// Whether a pixel lies in the picture.
@@ -173,6 +176,19 @@ mod tests {
                 assert!((back - world).length() < 1e-6, "k1 {k1}: {world} came back as {back}");
             }
         }
+    }
+
+    #[test]
+    fn what_a_lens_cannot_show_is_not_folded_into_the_picture() {
+        let camera = Camera { k1: -0.1, ..main_camera() };
+        let aside = |tangent: f64| {
+            let ahead = camera.position + camera.forward() * 10.0;
+            camera.project(ahead + camera.rotation.row(0) * 10.0 * tangent)
+        };
+        assert!(aside(1.0).unwrap().x > aside(0.5).unwrap().x);
+        // The formula alone would put this point at a tangent of 0.3, in the middle of the picture.
+        assert!((3.0 * (1.0 - 0.1 * 9.0) - 0.3f64).abs() < 1e-12);
+        assert_eq!(aside(3.0), None);
     }
 
     #[test]

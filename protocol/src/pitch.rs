@@ -95,7 +95,13 @@ impl Marking {
     /// Whether the paint, [`LINE_WIDTH_M`] wide, covers a place of the pitch.
     #[must_use]
     pub fn covers(&self, place: DVec2) -> bool {
-        let half = LINE_WIDTH_M / 2.0;
+        self.covers_painted(place, LINE_WIDTH_M)
+    }
+
+    /// As [`covers`](Self::covers), with lines of another width in metres; spots keep their radius.
+    #[must_use]
+    pub fn covers_painted(&self, place: DVec2, line_m: f64) -> bool {
+        let half = line_m / 2.0;
         match *self {
             Self::Line { from, to } => {
                 let along = (place - from).dot(to - from) / (to - from).length_squared();

@@ -14,6 +14,7 @@ use crate::{
     correspondences::clicked,
     fixture::{Fixture, FixtureOptions},
     operator::Platform,
+    output::{make_folder, put},
     render::{Exposure, Scene, Window},
     shots::{self, Shots, Take},
     shutter::Shutter,
@@ -161,11 +162,7 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
             platform: options.platform,
         },
     )?;
-    std::fs::create_dir_all(&options.out).map_err(|source| SynthesisError::Io {
-        path: options.out.clone(),
-        doing: "create",
-        source,
-    })?;
+    make_folder(&options.out)?;
     let rows = fixture.members.len();
     let reduced: Vec<Reduced> = fixture
         .members
@@ -216,7 +213,7 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
     let points = clicked(&fixture.cameras[0], &fixture.stadium.pitch, 0, 10, &mut rng);
     let text = serde_json::to_string_pretty(&points)
         .map_err(|error| SynthesisError::Options(format!("correspondences.json: {error}")))?;
-    truth::put(&options.out.join("correspondences.json"), (text + "\n").as_bytes())?;
+    put(&options.out.join("correspondences.json"), (text + "\n").as_bytes())?;
     let clip_bytes = std::fs::metadata(&clip)
         .map_err(|source| SynthesisError::Io { path: clip.clone(), doing: "read", source })?
         .len();

@@ -46,6 +46,7 @@ pub struct Fixture {
     pub ball: Vec<Vec3>,
     /// The score graphic.
     pub score: ScoreBoard,
+    ball_turns: Vec<Quat>,
     net: NetLook,
     things: Vec<Solid>,
 }
@@ -156,7 +157,19 @@ impl Fixture {
         }
         let chain = Chain::new(options.setting, options.seed, &stadium, options.size_px);
         let cameras = film.iter().map(|frame| frame.main.camera).collect();
-        Ok(Self { stadium, members, cameras, film, chain, bystanders, ball: paths.ball, score, net, things })
+        Ok(Self {
+            stadium,
+            members,
+            cameras,
+            film,
+            chain,
+            bystanders,
+            ball_turns: turns(&paths.ball),
+            ball: paths.ball,
+            score,
+            net,
+            things,
+        })
     }
 
     /// Frames that were prepared.
@@ -177,19 +190,9 @@ impl Fixture {
                 Actor { figure: &member.figure, posed }
             })
             .collect();
-        // The ball rolls as far as it moves.
-        let (mut turn, mut last) = (Quat::IDENTITY, self.ball[0]);
-        for &at in &self.ball[..=frame] {
-            let moved = at - last;
-            let axis = Vec3::Y.cross(moved);
-            if axis.length() > 1e-4 {
-                turn = Quat::from_axis_angle(axis.normalize(), moved.length() / props::BALL_RADIUS_M) * turn;
-            }
-            last = at;
-        }
         let mut solids: Vec<Cow<'_, Solid>> = self.things.iter().map(Cow::Borrowed).collect();
         solids.extend(self.bystanders.iter().map(|person| Cow::Borrowed(&person.solid)));
-        solids.push(Cow::Owned(props::ball(self.ball[frame], turn)));
+        solids.push(Cow::Owned(props::ball(self.ball[frame], self.ball_turns[frame])));
         Scene { stadium: &self.stadium, actors, solids, nets: Some(self.net) }
     }
 
@@ -198,6 +201,22 @@ impl Fixture {
     pub fn anchor_m(&self, member: usize, frame: usize) -> Vec3 {
         self.members[member].movement.steps[frame].placement.anchor_m
     }
+}
+
+/// How the ball has turned at each place of its path: it rolls as far as it moves.
+fn turns(ball: &[Vec3]) -> Vec<Quat> {
+    let (mut turn, mut last) = (Quat::IDENTITY, ball.first().copied().unwrap_or_default());
+    ball.iter()
+        .map(|&at| {
+            let moved = at - last;
+            let axis = Vec3::Y.cross(moved);
+            if axis.length() > 1e-4 {
+                turn = Quat::from_axis_angle(axis.normalize(), moved.length() / props::BALL_RADIUS_M) * turn;
+            }
+            last = at;
+            turn
+        })
+        .collect()
 }
 
 /// Films the play with the cameras of all shots.

@@ -96,12 +96,6 @@ impl Legs {
         -self.legs[0].heel.y
     }
 
-    /// Distance of a hip joint from the middle.
-    #[must_use]
-    pub fn half_width_m(&self) -> f32 {
-        self.legs[0].hip.x.abs()
-    }
-
     /// The foot of one side in `pose`, from the middle of the hips.
     #[must_use]
     pub fn foot(&self, pose: &Pose, side: usize) -> Foot {

@@ -38,6 +38,7 @@ mod noise;
 mod npy;
 pub mod operator;
 pub mod outfit;
+pub mod output;
 pub mod overlay;
 mod packed;
 pub mod paint;

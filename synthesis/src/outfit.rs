@@ -24,6 +24,17 @@ pub fn to_srgb(light: Vec3) -> Srgb {
     })
 }
 
+/// CIELAB under D65 (ISO/CIE 11664-4).
+#[must_use]
+pub fn lab(colour: Srgb) -> Vec3 {
+    let light = linear(colour);
+    let x = light.dot(Vec3::new(0.4124, 0.3576, 0.1805)) / 0.9505;
+    let y = light.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    let z = light.dot(Vec3::new(0.0193, 0.1192, 0.9505)) / 1.089;
+    let f = |t: f32| if t > 0.008_856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 };
+    Vec3::new(116.0 * f(y) - 16.0, 500.0 * (f(x) - f(y)), 200.0 * (f(y) - f(z)))
+}
+
 /// The pattern of a shirt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pattern {

@@ -103,6 +103,12 @@ const TEXEL_M: f32 = 0.25;
 const REACH_M: f32 = 6.0;
 
 impl Turf {
+    /// Width of the painted lines, metres.
+    #[must_use]
+    pub fn line_m(&self) -> f64 {
+        f64::from(self.look.line_m)
+    }
+
     /// Prepares the ground of a pitch.
     #[must_use]
     pub fn new(pitch: &Pitch, look: TurfLook, seed: u32) -> Self {

@@ -4,7 +4,7 @@
 use rand::{Rng, seq::IndexedRandom};
 
 use crate::{
-    outfit::{Kit, Pattern, Srgb, linear},
+    outfit::{Kit, Pattern, Srgb, lab},
     trajectories::Role,
 };
 
@@ -86,16 +86,6 @@ pub fn seen_colour(kit: &Kit) -> Srgb {
 #[must_use]
 pub fn difference(a: Srgb, b: Srgb) -> f32 {
     lab(a).distance(lab(b))
-}
-
-/// CIELAB under D65 (ISO/CIE 11664-4).
-fn lab(colour: Srgb) -> glam::Vec3 {
-    let light = linear(colour);
-    let x = light.dot(glam::Vec3::new(0.4124, 0.3576, 0.1805)) / 0.9505;
-    let y = light.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722));
-    let z = light.dot(glam::Vec3::new(0.0193, 0.1192, 0.9505)) / 1.089;
-    let f = |t: f32| if t > 0.008_856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 };
-    glam::Vec3::new(116.0 * f(y) - 16.0, 500.0 * (f(x) - f(y)), 200.0 * (f(y) - f(z)))
 }
 
 fn one_colour(rng: &mut impl Rng, id: String, colours: &[Srgb], dark_shorts: f64) -> Kit {

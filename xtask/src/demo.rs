@@ -25,21 +25,8 @@ pub(crate) fn run(no_window: bool) -> Result<()> {
     cargo(&["build", "--package", "reconstructor", "--package", "player"])?;
     let out = root().join("target/demo");
     fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
-    built(
-        "reconstructor",
-        &[
-            "reconstruct",
-            "assets/demo/clip.mp4",
-            "--calibration",
-            "assets/demo/correspondences.json",
-            "--out",
-            "target/demo/stream",
-            "--work",
-            "target/demo/work",
-            "--report",
-            "target/demo/report.json",
-        ],
-    )?;
+    let kept = ["--work", "target/demo/work", "--report", "target/demo/report.json"];
+    reconstruct("target/demo/stream", &kept)?;
     built(
         "reconstructor",
         &[
@@ -78,4 +65,10 @@ pub(crate) fn run(no_window: bool) -> Result<()> {
         return Ok(());
     }
     built("player", &["target/demo/stream"])
+}
+
+/// Reconstructs the shipped clip into a folder; the reconstructor is built.
+pub(crate) fn reconstruct(out: &str, more: &[&str]) -> Result<()> {
+    let clip = ["reconstruct", "assets/demo/clip.mp4", "--calibration", "assets/demo/correspondences.json"];
+    built("reconstructor", &[&clip[..], &["--out", out], more].concat())
 }

@@ -19,18 +19,24 @@ pub(crate) fn run() -> Result<()> {
     tests()
 }
 
-/// `cargo test` on software Vulkan, with every optional tool required: here nothing may skip for want of one.
+/// Every test, with every optional tool required: here nothing may skip for want of one.
 fn tests() -> Result<()> {
     // The headset's tests put this OpenXR layer between the player and the runtime.
     cargo(&["build", "--package", "fakeplanes"])?;
+    cargo_test(&[], "HOLOPITCH_REQUIRE_TOOLS")
+}
+
+/// `cargo test` of the workspace on software Vulkan and the tests' OpenXR runtime, with a variable set to 1.
+pub(crate) fn cargo_test(arguments: &[&str], variable: &str) -> Result<()> {
     let program = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     run_command(
         std::process::Command::new(program)
             .args(["test", "--workspace"])
+            .args(arguments)
             .envs(openxr::folder()?.map(|folder| ("HOLOPITCH_OPENXR_ROOT", folder)))
             .envs(setup::environment())
             .env("VK_DRIVER_FILES", setup::software_vulkan()?)
-            .env("HOLOPITCH_REQUIRE_TOOLS", "1")
+            .env(variable, "1")
             .current_dir(root()),
     )
 }

@@ -7,8 +7,8 @@ use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingResource, BindingType, Buffer, BufferBindingType, BufferDescriptor,
     BufferUsages, Color, ColorTargetState, ColorWrites, CommandEncoder, Device, Extent3d, FragmentState,
-    LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor, PrimitiveState, PrimitiveTopology, Queue,
-    RenderPass, RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor,
+    LoadOp, MultisampleState, Operations, PipelineLayoutDescriptor, PrimitiveState, Queue, RenderPass,
+    RenderPassColorAttachment, RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor,
     SamplerBindingType, ShaderModuleDescriptor, ShaderSource, ShaderStages, StoreOp, TextureDescriptor,
     TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureView, TextureViewDimension,
     VertexBufferLayout, VertexState, VertexStepMode, vertex_attr_array,
@@ -125,15 +125,7 @@ impl Cast {
                 Catcher::Patch => (PATCH, 0, &[]),
                 Catcher::Outline => (OUTLINE, size_of::<[f32; 2]>(), &outline),
             };
-            let kind = Kind {
-                name: "catcher",
-                shader,
-                mixing,
-                topology: PrimitiveTopology::TriangleList,
-                step_mode: VertexStepMode::Vertex,
-                stride,
-                attributes,
-            };
+            let kind = Kind::triangles("catcher", shader, mixing, stride, attributes);
             build(device, format, &catching, &kind)
         };
         Self {

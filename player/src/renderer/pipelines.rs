@@ -61,6 +61,27 @@ pub(super) struct Kind<'a> {
     pub(super) attributes: &'a [VertexAttribute],
 }
 
+impl<'a> Kind<'a> {
+    /// Triangles from vertices of their own.
+    pub(super) fn triangles(
+        name: &'static str,
+        shader: &'a str,
+        mixing: Mixing,
+        stride: usize,
+        attributes: &'a [VertexAttribute],
+    ) -> Self {
+        Self {
+            name,
+            shader,
+            mixing,
+            topology: PrimitiveTopology::TriangleList,
+            step_mode: VertexStepMode::Vertex,
+            stride,
+            attributes,
+        }
+    }
+}
+
 impl Pipelines {
     /// `plain` binds the view, `textured` also an atlas.
     pub(super) fn new(
@@ -70,15 +91,6 @@ impl Pipelines {
         textured: &PipelineLayout,
     ) -> Self {
         let build = |layout, kind: &Kind<'_>| build(device, format, layout, kind);
-        let triangles = |name, shader, mixing, stride, attributes| Kind {
-            name,
-            shader,
-            mixing,
-            topology: PrimitiveTopology::TriangleList,
-            step_mode: VertexStepMode::Vertex,
-            stride,
-            attributes,
-        };
         let ground_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Uint32];
         let solid_attributes = vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3];
         let shadow_attributes = vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Float32];
@@ -87,11 +99,17 @@ impl Pipelines {
         Self {
             backdrop: build(
                 plain,
-                &triangles("backdrop", include_str!("shaders/backdrop.wgsl"), Mixing::Background, 0, &[]),
+                &Kind::triangles(
+                    "backdrop",
+                    include_str!("shaders/backdrop.wgsl"),
+                    Mixing::Background,
+                    0,
+                    &[],
+                ),
             ),
             ground: build(
                 plain,
-                &triangles(
+                &Kind::triangles(
                     "ground",
                     include_str!("shaders/ground.wgsl"),
                     Mixing::Opaque,
@@ -101,7 +119,7 @@ impl Pipelines {
             ),
             solid: build(
                 plain,
-                &triangles(
+                &Kind::triangles(
                     "solid",
                     include_str!("shaders/solid.wgsl"),
                     Mixing::Opaque,
@@ -123,7 +141,7 @@ impl Pipelines {
             ),
             body: build(
                 textured,
-                &triangles(
+                &Kind::triangles(
                     "body",
                     include_str!("shaders/body.wgsl"),
                     Mixing::Opaque,
@@ -133,7 +151,7 @@ impl Pipelines {
             ),
             net: build(
                 plain,
-                &triangles(
+                &Kind::triangles(
                     "net",
                     include_str!("shaders/net.wgsl"),
                     Mixing::Transparent,

@@ -68,7 +68,7 @@ pub mod index {
 /// warming up, and a bound on the time that one picture of noise can take.
 const CANDIDATES_MAX: usize = 80;
 /// Below this the network saw no whole person.
-const POSE_SCORE_MIN: f32 = 0.3;
+pub(crate) const POSE_SCORE_MIN: f32 = 0.3;
 /// A mask below this share of the body's box is none.
 const MASK_SHARE_MIN: f64 = 0.08;
 /// Below this score, or with the hips more than this part of the square from its middle, a second look is taken from

@@ -28,6 +28,14 @@ fn split(name: &str) -> Option<Split> {
     }
 }
 
+fn yes(word: &str) -> Option<bool> {
+    match word {
+        "yes" => Some(true),
+        "no" => Some(false),
+        _ => None,
+    }
+}
+
 fn depth(mut arguments: impl Iterator<Item = String>) -> Option<DepthOptions> {
     let mut options = DepthOptions {
         out: PathBuf::new(),
@@ -74,8 +82,8 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
             "--count" => options.count = value.parse().ok()?,
             "--seed" => options.seed = value.parse().ok()?,
             "--split" => options.split = split(&value)?,
-            "--maps" => options.maps = value == "yes",
-            "--main-only" => options.main_only = value == "yes",
+            "--maps" => options.maps = yes(&value)?,
+            "--main-only" => options.main_only = yes(&value)?,
             "--size" => {
                 let (width, height) = value.split_once('x')?;
                 options.size_px = (width.parse().ok()?, height.parse().ok()?);

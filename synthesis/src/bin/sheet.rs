@@ -16,6 +16,7 @@ use synthesis::{
     figure::Figure,
     motion::Motions,
     movement::{Habits, Movement},
+    output::make_folder,
     play::Event,
     render::{Actor, Scene, Window},
     rig,
@@ -196,12 +197,9 @@ fn main() -> ExitCode {
         eprintln!("{USAGE}");
         return ExitCode::from(2);
     };
-    let made = std::fs::create_dir_all(&options.out).map_err(|source| SynthesisError::Io {
-        path: options.out.clone(),
-        doing: "create",
-        source,
-    });
-    match made.and_then(|()| if options.what == "actions" { actions(&options) } else { kits(&options) }) {
+    match make_folder(&options.out)
+        .and_then(|()| if options.what == "actions" { actions(&options) } else { kits(&options) })
+    {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");

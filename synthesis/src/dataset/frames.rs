@@ -2,23 +2,28 @@
 //! the ball, and for holding ours against real broadcasts.
 //!
 //! A set is split by the seeds of its matches: seed modulo 8 is 7 for test, 6 for validation, 0 to 5 for training. People,
-//! kits, ground, light and camera all follow from the seed, so the parts share none of them.
+//! kits, ground, light and camera are drawn anew for every match; what they are drawn from, motions included, is the same for
+//! all parts.
 
-use std::path::PathBuf;
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicUsize, Ordering},
+};
 
 use image::{ImageEncoder, RgbImage, codecs::jpeg::JpegEncoder};
 use rand::Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Split, cast::rng, create};
+use super::{Split, cast::rng};
 use crate::{
     SynthesisError,
     clip::{FRAME_RATE, render_frame},
     fixture::{Fixture, FixtureOptions},
+    output::{make_folder, put},
     shots::{Shot, ShotKind, Shots},
     trajectories::{Role, Trajectories},
-    truth::{self, FrameTruth, PersonTruth, put},
+    truth::{self, FrameTruth, PersonTruth},
 };
 
 /// Pictures taken of one match.
@@ -86,19 +91,17 @@ pub fn broadcast_frames(
         return Err(SynthesisError::Options("a set needs at least one picture".into()));
     }
     for folder in ["images", "labels", "maps"].iter().filter(|name| **name != "maps" || options.maps) {
-        create(&options.out.join(folder))?;
+        make_folder(&options.out.join(folder))?;
     }
     let matches = options.count.div_ceil(PER_MATCH);
-    let finished = std::sync::atomic::AtomicUsize::new(0);
+    let finished = AtomicUsize::new(0);
     let lines: Vec<Vec<u8>> = (0..matches)
         .into_par_iter()
         .map(|index| {
-            let last = ((index + 1) * PER_MATCH).min(options.count);
-            let lines = one_match(options, index, index * PER_MATCH..last)?;
-            progress(
-                finished.fetch_add(last - index * PER_MATCH, std::sync::atomic::Ordering::Relaxed) + last
-                    - index * PER_MATCH,
-            );
+            let first = index * PER_MATCH;
+            let pictures = PER_MATCH.min(options.count - first);
+            let lines = one_match(options, index, first..first + pictures)?;
+            progress(finished.fetch_add(pictures, Ordering::Relaxed) + pictures);
             Ok(lines)
         })
         .collect::<Result<_, SynthesisError>>()?;

@@ -7,7 +7,14 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use crate::{SynthesisError, body::BaseBody, gait, motion::Motions, npy, truth::put};
+use crate::{
+    SynthesisError,
+    body::BaseBody,
+    gait,
+    motion::Motions,
+    npy,
+    output::{make_folder, put},
+};
 
 mod cast;
 mod frames;
@@ -76,7 +83,7 @@ pub fn depth_crops(options: &DepthOptions, progress: impl Fn(usize) + Sync) -> R
             progress(last);
             continue;
         }
-        create(&folder)?;
+        make_folder(&folder)?;
         let cast = Cast::new(&base, options, shard, (options.shard / 5).clamp(8, 128));
         let samples: Vec<Sample> = (first..last)
             .into_par_iter()
@@ -89,14 +96,6 @@ pub fn depth_crops(options: &DepthOptions, progress: impl Fn(usize) + Sync) -> R
         write_shard(&folder, &samples)?;
     }
     Ok(())
-}
-
-fn create(folder: &Path) -> Result<(), SynthesisError> {
-    std::fs::create_dir_all(folder).map_err(|source| SynthesisError::Io {
-        path: folder.to_owned(),
-        doing: "create",
-        source,
-    })
 }
 
 fn write_shard(folder: &Path, samples: &[Sample]) -> Result<(), SynthesisError> {

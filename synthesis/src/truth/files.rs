@@ -8,8 +8,12 @@ use std::{
 
 use protocol::chunk::ChunkFrame;
 
-use super::{FrameTruth, MARKING_NAMES, Maps, StreamWriter, Truth, mot, people_truth, put};
-use crate::{SynthesisError, fixture::Fixture};
+use super::{FrameTruth, MARKING_NAMES, Maps, StreamWriter, Truth, mot, people_truth};
+use crate::{
+    SynthesisError,
+    fixture::Fixture,
+    output::{make_folder, put},
+};
 
 /// What is written.
 #[derive(Clone, Copy, Debug)]
@@ -38,9 +42,9 @@ pub struct TruthWriter {
 impl TruthWriter {
     /// Begins in `folder`, which is made.
     pub fn create(folder: &Path, options: TruthOptions) -> Result<Self, SynthesisError> {
-        make(&folder.join("mot/gt"))?;
+        make_folder(&folder.join("mot/gt"))?;
         if options.maps {
-            make(&folder.join("maps"))?;
+            make_folder(&folder.join("maps"))?;
         }
         Ok(Self {
             folder: folder.to_owned(),
@@ -87,8 +91,7 @@ impl TruthWriter {
             let path = self.folder.join(path);
             file.flush().map_err(|source| SynthesisError::Io { path, doing: "write", source })?;
         }
-        let name = self.folder.file_name().map_or("clip".into(), |name| name.to_string_lossy());
-        let sequence = mot::sequence(&name, self.count, frame_rate, [width, height]);
+        let sequence = mot::sequence(self.count, frame_rate, [width, height]);
         put(&self.folder.join("mot/seqinfo.ini"), sequence.as_bytes())?;
         let truth = Truth {
             frame_rate: [frame_rate, 1],
@@ -103,14 +106,6 @@ impl TruthWriter {
         put(&self.folder.join("truth.json"), text.as_bytes())?;
         Ok(self.bytes + text.len() as u64 + self.stream.finish(fixture, triangles)?)
     }
-}
-
-fn make(folder: &Path) -> Result<(), SynthesisError> {
-    std::fs::create_dir_all(folder).map_err(|source| SynthesisError::Io {
-        path: folder.to_owned(),
-        doing: "create",
-        source,
-    })
 }
 
 fn open(path: &Path) -> Result<BufWriter<File>, SynthesisError> {

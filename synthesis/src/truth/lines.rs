@@ -4,11 +4,11 @@ use glam::DVec2;
 use image::{GrayImage, Luma};
 use protocol::{
     camera::Camera,
-    pitch::{LINE_WIDTH_M, Marking, Pitch},
+    pitch::{Marking, Pitch},
 };
 
 use super::{PitchPoint, rounded};
-use crate::correspondences::candidates;
+use crate::{correspondences::candidates, stadium::Stadium};
 
 /// What the markings of [`Pitch::markings`] are, in its order: value `k + 1` of a line map is name `k`.
 pub const MARKING_NAMES: &[&str] = &[
@@ -44,20 +44,21 @@ pub const MARKING_NAMES: &[&str] = &[
 /// For every pixel 0, or the marking whose paint covers its middle, counted from 1 in the order of [`MARKING_NAMES`].
 /// Paint counts as it lies on the pitch, whether somebody stands before it or not.
 #[must_use]
-pub fn line_map(camera: &Camera, pitch: &Pitch) -> GrayImage {
+pub fn line_map(camera: &Camera, stadium: &Stadium) -> GrayImage {
+    let (pitch, line_m) = (&stadium.pitch, stadium.turf.line_m());
     let mut map = GrayImage::new(camera.width_px, camera.height_px);
     for (index, marking) in pitch.markings().iter().enumerate() {
         let value = Luma([index as u8 + 1]);
         let reach_m = match marking {
             Marking::Spot { radius_m, .. } => *radius_m,
-            Marking::Line { .. } | Marking::Arc { .. } => LINE_WIDTH_M / 2.0,
+            Marking::Line { .. } | Marking::Arc { .. } => line_m / 2.0,
         };
         // Along the marking in steps shorter than the paint is wide, each with the pixels that the paint may touch.
         for place in marking.sample(SPACING_M) {
             let Some([low, high]) = reach(camera, place, reach_m + SPACING_M) else { continue };
             for y in low[1]..=high[1] {
                 for x in low[0]..=high[0] {
-                    if map.get_pixel(x, y)[0] == 0 && covered(camera, marking, x, y) {
+                    if map.get_pixel(x, y)[0] == 0 && covered(camera, marking, line_m, x, y) {
                         map.put_pixel(x, y, value);
                     }
                 }
@@ -69,9 +70,9 @@ pub fn line_map(camera: &Camera, pitch: &Pitch) -> GrayImage {
 
 const SPACING_M: f64 = 0.1;
 
-fn covered(camera: &Camera, marking: &Marking, x: u32, y: u32) -> bool {
+fn covered(camera: &Camera, marking: &Marking, line_m: f64, x: u32, y: u32) -> bool {
     let ground = camera.ground_point(DVec2::new(f64::from(x), f64::from(y)));
-    ground.is_some_and(|point| marking.covers(DVec2::new(point.x, point.z)))
+    ground.is_some_and(|point| marking.covers_painted(DVec2::new(point.x, point.z), line_m))
 }
 
 /// First and last pixel of the picture within `radius_m` of a place of the pitch; `None` when there is none.
@@ -108,7 +109,12 @@ pub(super) fn points_in_picture(camera: &Camera, pitch: &Pitch) -> Vec<PitchPoin
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        turf::{Turf, TurfLook},
+        venue::Venue,
+    };
     use glam::DVec3;
+    use protocol::pitch::LINE_WIDTH_M;
 
     #[test]
     fn every_marking_has_its_name() {
@@ -128,14 +134,20 @@ mod tests {
         let mut camera =
             Camera::looking_at((320, 180), 500.0, DVec3::new(4.0, 15.0, 60.0), DVec3::new(-38.0, 0.0, 4.0));
         camera.k1 = -0.05;
-        let map = line_map(&camera, &pitch);
+        let mut venue = Venue::plain(1, pitch, [[0.5; 3]; 2]);
+        let map = line_map(&camera, &venue.stadium);
         let markings = pitch.markings();
         let mut painted = 0;
         for (x, y, value) in map.enumerate_pixels() {
-            let any = markings.iter().position(|marking| covered(&camera, marking, x, y));
+            let any = markings.iter().position(|marking| covered(&camera, marking, LINE_WIDTH_M, x, y));
             assert_eq!(usize::from(value[0]), any.map_or(0, |k| k + 1), "pixel {x}, {y}");
             painted += usize::from(value[0] > 0);
         }
         assert!(painted > 200, "{painted} painted pixels");
+        // Narrower paint is narrower in the map.
+        let look = TurfLook { line_m: 0.08, ..TurfLook::default() };
+        venue.stadium.turf = Turf::new(&pitch, look, 1);
+        let narrow = line_map(&camera, &venue.stadium).pixels().filter(|value| value[0] > 0).count();
+        assert!(narrow * 10 < painted * 9, "{narrow} painted pixels of {painted}");
     }
 }

@@ -3,14 +3,11 @@
 //! [`measure`] looks at one frame; [`TruthWriter`] writes `truth.json`, `frames.jsonl`, `mot/`, `maps/` and the true surfaces
 //! as a stream. `docs/datasets.md` describes every file.
 
-use std::{io::Write, path::Path};
-
 use glam::{DVec2, DVec3};
 use protocol::{camera::Camera, pitch::Pitch};
 use serde::Serialize;
 
 use crate::{
-    SynthesisError,
     acts::Kind,
     bystanders::Part,
     fixture::{Fixture, Member},
@@ -171,7 +168,7 @@ pub fn measure(
             visible[*actor].add((place % size[0]) as u32, (place / size[0]) as u32);
         }
     }
-    let mut maps = with_maps.then(|| Maps::new(size, &hits, line_map(&camera, &fixture.stadium.pitch)));
+    let mut maps = with_maps.then(|| Maps::new(size, &hits, line_map(&camera, &fixture.stadium)));
     let mut people = Vec::new();
     for (id, actor) in scene.actors.iter().enumerate() {
         let Some([low, high]) = projected_box(&camera, actor.posed.positions.iter().map(|p| p.as_dvec3()))
@@ -298,15 +295,6 @@ pub fn people_truth(members: &[Member]) -> Vec<PersonTruth> {
 
 fn bytes(colour: Srgb) -> [u8; 3] {
     colour.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
-}
-
-/// Writes a file as a whole or not at all.
-pub fn put(path: &Path, bytes: &[u8]) -> Result<(), SynthesisError> {
-    let temporary = path.with_extension("partial");
-    let written = std::fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    written.map_err(|source| SynthesisError::Io { path: path.to_owned(), doing: "write", source })
 }
 
 #[cfg(test)]

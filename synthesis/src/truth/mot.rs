@@ -28,8 +28,8 @@ pub(super) fn lines(truth: &FrameTruth) -> String {
 }
 
 /// `seqinfo.ini`.
-pub(super) fn sequence(name: &str, frames: usize, frame_rate: u32, [width, height]: [u32; 2]) -> String {
+pub(super) fn sequence(frames: usize, frame_rate: u32, [width, height]: [u32; 2]) -> String {
     format!(
-        "[Sequence]\nname={name}\nimDir=\nframeRate={frame_rate}\nseqLength={frames}\nimWidth={width}\nimHeight={height}\nimExt=\n"
+        "[Sequence]\nname=clip\nimDir=\nframeRate={frame_rate}\nseqLength={frames}\nimWidth={width}\nimHeight={height}\nimExt=\n"
     )
 }

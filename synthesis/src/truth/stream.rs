@@ -11,12 +11,13 @@ use protocol::{
     time::{Ticks, Timescale},
 };
 
-use super::{FrameTruth, bytes, people_truth, put};
+use super::{FrameTruth, bytes, people_truth};
 use crate::{
     SynthesisError,
     figure::{Figure, Material},
     fixture::{Fixture, Member},
     outfit::{Pattern, Srgb},
+    output::{make_folder, put},
     render::Scene,
 };
 
@@ -172,12 +173,7 @@ pub struct StreamWriter {
 impl StreamWriter {
     /// A stream in `folder`, which is made.
     pub fn create(folder: &Path, frame_rate: u32) -> Result<Self, SynthesisError> {
-        let chunks_folder = folder.join(NAME);
-        std::fs::create_dir_all(&chunks_folder).map_err(|source| SynthesisError::Io {
-            path: chunks_folder.clone(),
-            doing: "create",
-            source,
-        })?;
+        make_folder(&folder.join(NAME))?;
         let timescale = Timescale::new(frame_rate, 1).ok_or_else(|| broken("its frame rate is zero"))?;
         Ok(Self {
             folder: folder.to_owned(),

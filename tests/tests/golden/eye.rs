@@ -6,9 +6,10 @@
 use glam::{DMat3, DQuat, DVec3};
 use holopitch_tests::{
     excerpt,
+    over::over,
     snapshot::{Snapshot, compare},
 };
-use image::{Rgba, RgbaImage};
+use image::RgbaImage;
 use player::{
     ar::{RoomCamera, synthetic::SyntheticRoom},
     camera::EyeView,
@@ -75,24 +76,6 @@ fn eye(camera: &RoomCamera) -> EyeView {
     }
 }
 
-/// Premultiplied colours over a picture, in linear light.
-fn over(room: &RgbaImage, front: &RgbaImage) -> RgbaImage {
-    let linear = |byte: u8| {
-        let value = f64::from(byte) / 255.0;
-        if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-    };
-    let encoded = |light: f64| {
-        let value = if light <= 0.003_130_8 { light * 12.92 } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
-        (value * 255.0).round().clamp(0.0, 255.0) as u8
-    };
-    RgbaImage::from_fn(room.width(), room.height(), |x, y| {
-        let (back, front) = (room.get_pixel(x, y).0, front.get_pixel(x, y).0);
-        let through = 1.0 - f64::from(front[3]) / 255.0;
-        let [r, g, b] = [0, 1, 2].map(|i| encoded(linear(front[i]) + linear(back[i]) * through));
-        Rgba([r, g, b, 255])
-    })
-}
-
 /// What the user sees: the match at `opacity`, hidden by `known` surfaces, with handles or with the table highlighted.
 fn draw(view: usize, opacity: f64, known: &[Surface], highlighted: bool, sight: Sight) -> Option<RgbaImage> {
     let gpu = software_adapter()?;
@@ -118,7 +101,12 @@ fn draw(view: usize, opacity: f64, known: &[Surface], highlighted: bool, sight: 
     };
     in_room.prepare(&gpu.device, &gpu.queue, &scene);
     let front = gpu.picture_for_eye(&in_room, FORMAT, &eye(&camera), SIZE_PX).unwrap();
-    Some(over(&room.picture(&camera).colour, &front))
+    let seen = room.picture(&camera).colour;
+    let behind = |x, y| {
+        let [r, g, b, _] = seen.get_pixel(x, y).0;
+        [r, g, b]
+    };
+    Some(over(behind, &front))
 }
 
 fn known() -> Vec<Surface> {

@@ -6,15 +6,18 @@ use std::fs;
 use glam::DVec3;
 use holopitch_tests::{
     excerpt,
+    over::over,
     snapshot::{Snapshot, compare},
 };
-use image::{Rgba, RgbaImage};
+use image::RgbaImage;
 
 use crate::{
     ALONE,
     runtime::{Head, Planes, Runtime, figures, folder, succeeded},
 };
 
+/// The room is of one colour.
+const LIGHT_ROOM: [u8; 3] = [196, 188, 176];
 const SEEN: (&str, &str) = ("FAKEPLANES_BLEND_MODE", "alpha");
 
 fn start(head: Head) -> Option<Runtime> {
@@ -40,23 +43,10 @@ fn run(
         let path = runtime.out().join("eyes").join(name);
         let front = image::open(&path).unwrap().into_rgba8();
         fs::remove_file(path).unwrap();
-        over_a_light_room(&front)
+        over(|_, _| LIGHT_ROOM, &front)
     };
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     (figures(&runtime.out().join("figures.json")), [eye("left.png"), eye("right.png")], told)
-}
-
-/// Premultiplied colours over a plain light one, in linear light.
-fn over_a_light_room(front: &RgbaImage) -> RgbaImage {
-    let linear = |byte: u8| (f64::from(byte) / 255.0).powf(2.2);
-    let encoded = |light: f64| (light.powf(1.0 / 2.2) * 255.0).round().clamp(0.0, 255.0) as u8;
-    RgbaImage::from_fn(front.width(), front.height(), |x, y| {
-        let [r, g, b, a] = front.get_pixel(x, y).0;
-        let through = 1.0 - f64::from(a) / 255.0;
-        let [r, g, b] = [(r, 196), (g, 188), (b, 176)]
-            .map(|(front, room)| encoded(linear(front) + linear(room) * through));
-        Rgba([r, g, b, 255])
-    })
 }
 
 #[test]

@@ -13,8 +13,8 @@ pub use marks::Marks;
 use glam::Vec3;
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages, Color,
-    CommandEncoder, Device, PipelineLayoutDescriptor, PrimitiveTopology, Queue, RenderPipeline,
-    VertexAttribute, VertexStepMode, vertex_attr_array,
+    CommandEncoder, Device, PipelineLayoutDescriptor, Queue, RenderPipeline, VertexAttribute,
+    vertex_attr_array,
 };
 
 use super::{
@@ -114,15 +114,7 @@ impl InRoom {
             ..Default::default()
         });
         let pipeline = |name, shader: &str, mixing, stride, attributes: &[VertexAttribute]| {
-            let kind = Kind {
-                name,
-                shader,
-                mixing,
-                topology: PrimitiveTopology::TriangleList,
-                step_mode: VertexStepMode::Vertex,
-                stride,
-                attributes,
-            };
+            let kind = Kind::triangles(name, shader, mixing, stride, attributes);
             build(device, format, &layout, &kind)
         };
         let Color { r, g, b, a } = format.surroundings.empty();

@@ -3,12 +3,15 @@
 use image::RgbImage;
 
 use super::{LabelledPicture, NetworkFigures, RealismError, spread};
-use crate::{detection::Detector, geometry::PixelBox, pose::PoseEstimator, report::Progress};
+use crate::{
+    detection::Detector,
+    geometry::PixelBox,
+    pose::{POSE_SCORE_MIN, PoseEstimator},
+    report::Progress,
+};
 
 /// People whose pose is looked at, of one picture: enough for a distribution.
 const POSES_PER_PICTURE: usize = 6;
-/// The pipeline's own bound on the pose network's confidence.
-const REJECTED_BELOW: f32 = 0.3;
 /// Overlap at which a detection counts.
 const IOU_MIN: f64 = 0.5;
 
@@ -19,7 +22,7 @@ pub(super) struct Looked {
 
 impl Looked {
     pub(super) fn figures(self) -> NetworkFigures {
-        let rejected = self.scores.iter().filter(|&&score| score < f64::from(REJECTED_BELOW)).count();
+        let rejected = self.scores.iter().filter(|&&score| score < f64::from(POSE_SCORE_MIN)).count();
         NetworkFigures {
             detector_recall: self.recall,
             pose_rejected: rejected as f64 / self.scores.len().max(1) as f64,

@@ -102,25 +102,28 @@ pub enum RealismError {
 /// When a folder holds no labelled pictures or a network cannot run.
 pub fn evaluate(real: &Path, ours: &Path, progress: &Progress) -> Result<RealismFigures, RealismError> {
     let [real, ours] = [labelled::read(real)?, labelled::read(ours)?];
-    let measure = |pictures: &[LabelledPicture]| -> Vec<statistics::Statistics> {
-        pictures
+    // Each measure with its values over all pictures.
+    let measure = |pictures: &[LabelledPicture]| -> Vec<(&'static str, Vec<f64>)> {
+        let measured: Vec<_> = pictures
             .par_iter()
             .map(|picture| {
                 progress.advance(1);
                 statistics::measure(picture)
             })
-            .collect()
+            .collect();
+        let mut all: Vec<(&'static str, Vec<f64>)> = Vec::new();
+        for (place, (name, values)) in measured.into_iter().flat_map(|one| one.into_iter().enumerate()) {
+            match all.get_mut(place) {
+                Some((_, before)) => before.extend(values),
+                None => all.push((name, values)),
+            }
+        }
+        all
     };
-    let [of_real, of_ours] = [measure(&real), measure(&ours)];
-    let mut measures: Vec<Comparison> = statistics::NAMES
-        .iter()
-        .enumerate()
-        .map(|(index, &name)| {
-            let values = |side: &[statistics::Statistics]| -> Vec<f64> {
-                side.iter().flat_map(|picture| picture.values[index].iter().copied()).collect()
-            };
-            compare(name, values(&of_real), values(&of_ours))
-        })
+    let mut measures: Vec<Comparison> = measure(&real)
+        .into_iter()
+        .zip(measure(&ours))
+        .map(|((name, real), (_, ours))| compare(name, real, ours))
         .collect();
     measures.sort_by(|a, b| b.distance.total_cmp(&a.distance));
     let distances: Vec<f64> = measures.iter().map(|m| m.distance).collect();

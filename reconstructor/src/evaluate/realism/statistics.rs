@@ -1,75 +1,68 @@
 //! What is measured on one labelled picture of 1280×720: people, kits, grass, lines, sharpness, colour.
 
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use image::RgbImage;
 
 use super::{
     LabelledPicture,
-    surroundings::{Planes, lab, median},
+    surroundings::{Planes, lab},
 };
-use crate::geometry::PixelBox;
+use crate::{geometry::PixelBox, report::median};
 
-/// The measures, in the order of [`Statistics::values`].
-pub(super) const NAMES: [&str; 16] = [
-    "people per picture",
-    "player height, px",
-    "contrast of kit to grass, CIE76 ΔE",
-    "sharpness of players, steepest step as a share of their range",
-    "luminance of the grass, 0..255",
-    "hue of the grass, degrees",
-    "saturation of the grass, 0..1",
-    "noise of the grass, levels",
-    "mowing and shade: spread of the grass in blocks of 16 px, levels",
-    "line width, px",
-    "contrast of lines to grass, levels",
-    "share of the picture that is grass",
-    "detail at 1–2 px as a share of 2–4 px, dB",
-    "detail at 2–4 px as a share of 4–8 px, dB",
-    "luminance outside the grass, 0..255",
-    "saturation outside the grass, 0..1",
-];
+/// What is measured, with its unit, and the values of one picture: one for measures of the picture, one each for measures
+/// of people or lines.
+pub(super) type Measured = [(&'static str, Vec<f64>); 16];
 
-/// The values of one picture: one for measures of the picture, one each for measures of people or lines.
-pub(super) struct Statistics {
-    pub(super) values: [Vec<f64>; NAMES.len()],
+pub(super) fn measure(LabelledPicture { picture, people }: &LabelledPicture) -> Measured {
+    let planes = Planes::new(picture);
+    let grass = Grass::of(picture, &planes);
+    let of_grass = |channel: usize| grass.colour.iter().map(|colour| colour[channel]).collect();
+    let lines = lines(&planes, people);
+    let [fine, middle, coarse] = bands(&planes);
+    let decibels = |a: f64, b: f64| 10.0 * (a / b.max(1e-9)).max(1e-9).log10();
+    let outside = outside(picture, &planes);
+    [
+        ("people per picture", vec![people.len() as f64]),
+        ("player height, px", people.iter().map(|person| person.size().y).collect()),
+        (
+            "contrast of kit to grass, CIE76 ΔE",
+            people.iter().filter_map(|person| kit_contrast(picture, &planes, person)).collect(),
+        ),
+        (
+            "sharpness of players, steepest step as a share of their range",
+            people.iter().filter_map(|person| sharpness(&planes, person)).collect(),
+        ),
+        ("luminance of the grass, 0..255", of_grass(0)),
+        ("hue of the grass, degrees", of_grass(1)),
+        ("saturation of the grass, 0..1", of_grass(2)),
+        ("noise of the grass, levels", grass.noise.into_iter().collect()),
+        (
+            "mowing and shade: spread of the grass in blocks of 16 px, levels",
+            grass.spread.into_iter().collect(),
+        ),
+        ("line width, px", lines.iter().map(|(width, _)| *width).collect()),
+        ("contrast of lines to grass, levels", lines.iter().map(|(_, contrast)| *contrast).collect()),
+        (
+            "share of the picture that is grass",
+            vec![planes.grass.iter().filter(|&&grass| grass).count() as f64 / planes.grass.len() as f64],
+        ),
+        ("detail at 1–2 px as a share of 2–4 px, dB", vec![decibels(fine, middle)]),
+        ("detail at 2–4 px as a share of 4–8 px, dB", vec![decibels(middle, coarse)]),
+        ("luminance outside the grass, 0..255", outside.iter().map(|[luminance, _]| *luminance).collect()),
+        ("saturation outside the grass, 0..1", outside.iter().map(|[_, saturation]| *saturation).collect()),
+    ]
 }
 
-pub(super) fn measure(labelled: &LabelledPicture) -> Statistics {
-    let planes = Planes::new(&labelled.picture);
-    let mut values: [Vec<f64>; NAMES.len()] = Default::default();
-    values[0].push(labelled.people.len() as f64);
-    for person in &labelled.people {
-        values[1].push(person.size().y);
-        values[2].extend(kit_contrast(&labelled.picture, &planes, person));
-        values[3].extend(sharpness(&planes, person));
-    }
-    let grass = Grass::of(&labelled.picture, &planes);
-    if let Some([luminance, hue, saturation]) = grass.colour {
-        values[4].push(luminance);
-        values[5].push(hue);
-        values[6].push(saturation);
-    }
-    values[7].extend(grass.noise);
-    values[8].extend(grass.spread);
-    for (width, contrast) in lines(&planes, &labelled.people) {
-        values[9].push(width);
-        values[10].push(contrast);
-    }
-    values[11].push(planes.grass.iter().filter(|&&g| g).count() as f64 / planes.grass.len() as f64);
-    let [fine, middle, coarse] = bands(&planes);
-    values[12].push(10.0 * (fine / middle.max(1e-9)).max(1e-9).log10());
-    values[13].push(10.0 * (middle / coarse.max(1e-9)).max(1e-9).log10());
-    let (mut luminance, mut saturation, mut count) = (0.0, 0.0, 0.0);
-    for (place, pixel) in labelled.picture.pixels().enumerate().filter(|(place, _)| !planes.grass[*place]) {
-        luminance += f64::from(planes.luminance[place]);
-        saturation += saturation_of(pixel.0);
+/// Mean luminance and saturation of what is not grass; `None` when that is next to nothing.
+fn outside(picture: &RgbImage, planes: &Planes) -> Option<[f64; 2]> {
+    let pixels = picture.pixels().zip(&planes.luminance).zip(&planes.grass);
+    let (mut sums, mut count) = ([0.0; 2], 0.0);
+    for ((pixel, &luminance), _) in pixels.filter(|(_, grass)| !**grass) {
+        sums[0] += f64::from(luminance);
+        sums[1] += saturation_of(pixel.0);
         count += 1.0;
     }
-    if count > 1000.0 {
-        values[14].push(luminance / count);
-        values[15].push(saturation / count);
-    }
-    Statistics { values }
+    (count > 1000.0).then(|| sums.map(|sum| sum / count))
 }
 
 /// Saturation as in HSV.
@@ -97,7 +90,8 @@ fn kit_contrast(picture: &RgbImage, planes: &Planes, person: &PixelBox) -> Optio
         return None;
     }
     let kit = kit.iter().sum::<Vec3>() / kit.len() as f32;
-    let ground = Vec3::from([0, 1, 2].map(|k| median(grass.iter().map(|c| c[k]).collect())));
+    let middle = |k: usize| median(&grass.iter().map(|c| f64::from(c[k])).collect::<Vec<_>>());
+    let ground = DVec3::new(middle(0)?, middle(1)?, middle(2)?).as_vec3();
     Some(f64::from(kit.distance(ground)))
 }
 
@@ -134,21 +128,21 @@ impl Grass {
         for (place, pixel) in
             picture.pixels().enumerate().filter(|(place, _)| planes.grass[*place]).step_by(7)
         {
-            luminances.push(planes.luminance[place]);
+            luminances.push(f64::from(planes.luminance[place]));
             hues.push(hue(pixel.0));
-            saturations.push(saturation_of(pixel.0) as f32);
+            saturations.push(saturation_of(pixel.0));
         }
         if luminances.len() < 500 {
             return Self { colour: None, noise: None, spread: None };
         }
-        let colour = [luminances, hues, saturations].map(|values| f64::from(median(values)));
+        let colour = [luminances, hues, saturations].map(|values| median(&values).unwrap_or_default());
         let (noise, spread) = planes.grass_noise_and_spread();
         Self { colour: Some(colour), noise, spread }
     }
 }
 
-fn hue(rgb: [u8; 3]) -> f32 {
-    let [r, g, b] = rgb.map(f32::from);
+fn hue(rgb: [u8; 3]) -> f64 {
+    let [r, g, b] = rgb.map(f64::from);
     let (low, high) = (r.min(g).min(b), r.max(g).max(b));
     let range = (high - low).max(1e-3);
     let sixth = if high == g {
@@ -162,16 +156,17 @@ fn hue(rgb: [u8; 3]) -> f32 {
 }
 
 /// Widest line that is looked for, pixels.
-const LINE_MAX_PX: u32 = 16;
+const LINE_MAX_PX: usize = 16;
 
 /// Width and contrast of painted lines where a row or a column crosses them: bright between grass on both sides.
 /// Of both directions the one that crosses more squarely gives the width.
 fn lines(planes: &Planes, people: &[PixelBox]) -> Vec<(f64, f64)> {
-    const STEP: u32 = 6;
+    /// Every so many rows is looked at.
+    const ROWS: usize = 6;
     let mut found = Vec::new();
     let (width, height) = planes.size;
-    for y in (LINE_MAX_PX..height.saturating_sub(LINE_MAX_PX)).step_by(STEP as usize) {
-        for x in (LINE_MAX_PX..width.saturating_sub(LINE_MAX_PX)).step_by(2) {
+    for y in (0..height).step_by(ROWS) {
+        for x in (0..width).step_by(2) {
             let at = DVec2::new(f64::from(x), f64::from(y));
             let wider = |b: &PixelBox| PixelBox { min: b.min - 4.0, max: b.max + 4.0 };
             let peak = planes.luminance[planes.place(x, y)];
@@ -220,23 +215,30 @@ mod tests {
         LabelledPicture { picture, people }
     }
 
+    fn named<'a>(found: &'a Measured, name: &str) -> &'a [f64] {
+        &found.iter().find(|(measure, _)| *measure == name).unwrap().1
+    }
+
     #[test]
     fn a_painted_picture_has_the_widths_heights_and_colours_it_was_painted_with() {
         for line_px in [2, 5] {
-            let found = measure(&painted(line_px)).values;
-            assert_eq!(found[0], [1.0]);
-            assert_eq!(found[1], [80.0]);
-            let width = median(found[9].iter().map(|&w| w as f32).collect());
-            assert!((width - line_px as f32).abs() < 0.6, "{width} px for {line_px}");
-            assert!((found[10][0] - 118.0).abs() < 20.0, "contrast {}", found[10][0]);
-            let (hue, saturation) = (found[5][0], found[6][0]);
+            let found = measure(&painted(line_px));
+            let values = |name: &str| named(&found, name);
+            assert_eq!(values("people per picture"), [1.0]);
+            assert_eq!(values("player height, px"), [80.0]);
+            let width = median(values("line width, px")).unwrap();
+            assert!((width - f64::from(line_px)).abs() < 0.6, "{width} px for {line_px}");
+            let contrast = values("contrast of lines to grass, levels")[0];
+            assert!((contrast - 118.0).abs() < 20.0, "contrast {contrast}");
+            let hue = values("hue of the grass, degrees")[0];
+            let saturation = values("saturation of the grass, 0..1")[0];
             assert!(
                 (hue - 105.0).abs() < 1.0 && (saturation - 80.0 / 130.0).abs() < 0.01,
                 "{hue} {saturation}"
             );
-            assert!(found[7][0] < 0.1, "there is no noise");
+            assert!(values("noise of the grass, levels")[0] < 0.1, "there is no noise");
             let kit = lab([220, 30, 30]).distance(lab(GREEN));
-            assert!((found[2][0] - f64::from(kit)).abs() < 0.5);
+            assert!((values("contrast of kit to grass, CIE76 ΔE")[0] - f64::from(kit)).abs() < 0.5);
             assert!(is_grass(GREEN) && !is_grass([230, 235, 230]) && !is_grass([220, 30, 30]));
         }
     }
@@ -246,8 +248,11 @@ mod tests {
         let mut sharp = painted(3);
         sharp.people[0].max.x += 12.0;
         let soft = LabelledPicture { picture: image::imageops::blur(&sharp.picture, 1.5), ..sharp.clone() };
-        let (sharp, soft) = (measure(&sharp).values, measure(&soft).values);
-        assert!(soft[12][0] < sharp[12][0] - 3.0, "{} and {} dB", soft[12][0], sharp[12][0]);
-        assert!(soft[3][0] < 0.7 * sharp[3][0]);
+        let (sharp, soft) = (measure(&sharp), measure(&soft));
+        let both = |name: &str| [named(&sharp, name)[0], named(&soft, name)[0]];
+        let [fine, blurred] = both("detail at 1–2 px as a share of 2–4 px, dB");
+        assert!(blurred < fine - 3.0, "{blurred} and {fine} dB");
+        let [crisp, soft] = both("sharpness of players, steepest step as a share of their range");
+        assert!(soft < 0.7 * crisp);
     }
 }

@@ -1,9 +1,10 @@
 //! Luminance and grass of a picture, and the small measures that only need those.
 
-use glam::{DVec2, Mat3, Vec3};
+use glam::{DVec2, Vec3};
 use image::RgbImage;
+use synthesis::outfit;
 
-use crate::geometry::PixelBox;
+use crate::{geometry::PixelBox, report::median};
 
 /// Luminance and grass, row by row.
 pub(super) struct Planes {
@@ -20,36 +21,9 @@ pub(super) fn is_grass([r, g, b]: [u8; 3]) -> bool {
     green > 40 && green >= red + 4 && green >= blue + 8 && (green - low) * 100 > 18 * green
 }
 
-/// CIELAB of an sRGB colour, white D65.
+/// CIELAB of an 8-bit sRGB colour.
 pub(super) fn lab(rgb: [u8; 3]) -> Vec3 {
-    let linear = Vec3::from(rgb.map(|c| {
-        let c = f32::from(c) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    }));
-    let xyz = Mat3::from_cols_array(&[
-        0.412_456_4,
-        0.212_672_9,
-        0.019_333_9,
-        0.357_576_1,
-        0.715_152_2,
-        0.119_192,
-        0.180_437_5,
-        0.072_175,
-        0.950_304_1,
-    ]) * linear
-        / Vec3::new(0.950_47, 1.0, 1.088_83);
-    let f =
-        Vec3::from(xyz.to_array().map(|t| if t > 0.008_856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 }));
-    Vec3::new(116.0 * f.y - 16.0, 500.0 * (f.x - f.y), 200.0 * (f.y - f.z))
-}
-
-/// The median; 0 of nothing.
-pub(super) fn median(mut values: Vec<f32>) -> f32 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    outfit::lab(rgb.map(|c| f32::from(c) / 255.0))
 }
 
 impl Planes {
@@ -91,7 +65,7 @@ impl Planes {
                 for y in top..top + BLOCK {
                     let row = self.place(left, y);
                     let row = &self.luminance[row..row + BLOCK as usize];
-                    differences.extend(row.windows(3).map(|w| (w[1] - (w[0] + w[2]) / 2.0).abs()));
+                    differences.extend(row.windows(3).map(|w| f64::from((w[1] - (w[0] + w[2]) / 2.0).abs())));
                 }
             }
         }
@@ -99,48 +73,55 @@ impl Planes {
             return (None, None);
         }
         // Of noise with the standard deviation s the difference has √1.5 s, and its median is 0.6745 of that.
-        let noise = f64::from(median(differences)) / (0.6745 * 1.5f64.sqrt());
+        let noise = median(&differences).map(|middle| middle / (0.6745 * 1.5f64.sqrt()));
         let mean = means.iter().sum::<f32>() / means.len() as f32;
         let spread = (means.iter().map(|m| (m - mean).powi(2)).sum::<f32>() / means.len() as f32).sqrt();
-        (Some(noise), Some(f64::from(spread)))
+        (noise, Some(f64::from(spread)))
     }
 
     /// Width and contrast of a line crossed at a pixel along a step: full width at half height, with grass on both sides.
-    pub(super) fn crossing(&self, (x, y): (u32, u32), (dx, dy): (i64, i64), most: u32) -> Option<(f64, f64)> {
-        let at = |k: i64| {
-            let (px, py) = (i64::from(x) + k * dx, i64::from(y) + k * dy);
-            let inside = px >= 0 && py >= 0 && px < i64::from(self.size.0) && py < i64::from(self.size.1);
-            inside.then(|| self.place(px as u32, py as u32))
+    /// The pixel must be the brightest of the crossing, the first of several.
+    pub(super) fn crossing(
+        &self,
+        (x, y): (u32, u32),
+        (dx, dy): (i64, i64),
+        most_px: usize,
+    ) -> Option<(f64, f64)> {
+        /// Pixels of grass beyond the line that tell its level.
+        const BEYOND: usize = 3;
+        let peak = self.luminance[self.place(x, y)];
+        // Distance of the half height from the pixel, and the level of the grass, on one side.
+        let flank = |sign: i64| {
+            // Level and grass from the pixel outwards, as far as the picture goes.
+            let profile: Vec<(f32, bool)> = (0..(most_px + BEYOND + 1) as i64)
+                .map_while(|k| {
+                    let px =
+                        u32::try_from(i64::from(x) + sign * k * dx).ok().filter(|px| *px < self.size.0)?;
+                    let py =
+                        u32::try_from(i64::from(y) + sign * k * dy).ok().filter(|py| *py < self.size.1)?;
+                    let place = self.place(px, py);
+                    Some((self.luminance[place], self.grass[place]))
+                })
+                .collect();
+            let grass = profile.iter().position(|&(level, grass)| grass && level < 0.75 * peak)?;
+            let beyond = profile.get(grass + 1..grass + 1 + BEYOND)?;
+            let ground = beyond.iter().map(|(level, _)| level).sum::<f32>() / BEYOND as f32;
+            if peak - ground < 18.0 || !beyond.iter().all(|(_, grass)| *grass) {
+                return None;
+            }
+            let half = (peak + ground) / 2.0;
+            let outer = profile.iter().position(|&(level, _)| level < half)?;
+            let line = profile.get(1..outer)?;
+            if line.iter().any(|&(level, _)| level > peak || (sign < 0 && level >= peak)) {
+                return None;
+            }
+            let (inner_level, outer_level) = (profile.get(outer - 1)?.0, profile[outer].0);
+            let part = (inner_level - half) / (inner_level - outer_level).max(1e-3);
+            Some(((outer - 1) as f32 + part, ground))
         };
-        let level = |k: i64| at(k).map(|place| self.luminance[place]);
-        let peak = level(0)?;
-        // The pixel is the brightest of the crossing, the first of several.
-        let most = i64::from(most);
-        let mut ends = [0.0; 2];
-        let mut ground = 0.0;
-        for (end, sign) in ends.iter_mut().zip([-1i64, 1]) {
-            let grass = (1..=most).find(|&k| {
-                at(sign * k).is_some_and(|place| self.grass[place])
-                    && level(sign * k).is_some_and(|l| l < 0.75 * peak)
-            })?;
-            let beyond: Option<f32> = (grass + 1..grass + 4).map(|k| level(sign * k)).sum();
-            if !(grass + 1..grass + 4).all(|k| at(sign * k).is_some_and(|place| self.grass[place])) {
-                return None;
-            }
-            let beyond = beyond? / 3.0;
-            if peak - beyond < 18.0 {
-                return None;
-            }
-            let half = (peak + beyond) / 2.0;
-            let last = (1..=grass + 1).find(|&k| level(sign * k).is_some_and(|l| l < half))?;
-            let (inner, outer) = (level(sign * (last - 1))?, level(sign * last)?);
-            if (1..last).any(|k| level(sign * k).is_some_and(|l| l > peak || (sign < 0 && l >= peak))) {
-                return None;
-            }
-            *end = (last - 1) as f32 + (inner - half) / (inner - outer).max(1e-3);
-            ground += beyond / 2.0;
-        }
-        Some((f64::from(ends[0] + ends[1]), f64::from(peak - ground)))
+        let ((before, ground_before), (after, ground_after)) = (flank(-1)?, flank(1)?);
+        let contrast = peak - (ground_before + ground_after) / 2.0;
+        Some((f64::from(before + after), f64::from(contrast)))
     }
 
     pub(super) fn clone_luminance(&self) -> Level {
