@@ -11,6 +11,7 @@ use std::{
 };
 
 use image::{ImageEncoder, RgbImage, codecs::jpeg::JpegEncoder};
+use protocol::pitch::Pitch;
 use rand::Rng;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -64,6 +65,8 @@ struct Line {
     name: String,
     /// Seed of its match.
     match_seed: u64,
+    /// Size of the pitch.
+    pitch: Pitch,
     /// Everybody in the match.
     everybody: Vec<PersonTruth>,
     #[serde(flatten)]
@@ -149,7 +152,7 @@ fn one_match(
                 put(&options.out.join("maps").join(format!("{name}-{kind}.png")), &file)?;
             }
         }
-        let line = Line { name, match_seed: seed, everybody: everybody.clone(), truth };
+        let line = Line { name, match_seed: seed, pitch: fixture.stadium.pitch, everybody: everybody.clone(), truth };
         serde_json::to_writer(&mut lines, &line)
             .map_err(|error| SynthesisError::Options(error.to_string()))?;
         lines.push(b'\n');
