@@ -4,11 +4,11 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use synthesis::{
     SynthesisError,
-    dataset::{DepthOptions, FrameOptions, Split, broadcast_frames, depth_crops},
+    dataset::{DepthOptions, FrameOptions, PER_MATCH, Split, broadcast_frames, depth_crops},
 };
 
 const USAGE: &str = "usage: dataset depth  --out DIR --count N [--seed S] [--split train|validation|test] [--motions FILE] [--shard N] [--height LOW..HIGH]
-       dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--maps yes|no] [--main-only yes|no]
+       dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--per-match N] [--maps yes|no] [--main-only yes|no]
 
 depth writes shard-NNNN/{crops.npy, mask.npy, offset_mm.npy, meta.jsonl}: rendered players for the depth network.
 frames writes images/, labels/ (YOLO: ball, goalkeeper, player, referee), frames.jsonl and maps/: whole pictures.
@@ -74,6 +74,7 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
         size_px: (1280, 720),
         maps: true,
         main_only: false,
+        per_match: PER_MATCH,
     };
     while let Some(name) = arguments.next() {
         let value = arguments.next()?;
@@ -83,6 +84,7 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
             "--seed" => options.seed = value.parse().ok()?,
             "--split" => options.split = split(&value)?,
             "--maps" => options.maps = yes(&value)?,
+            "--per-match" => options.per_match = value.parse().ok()?,
             "--main-only" => options.main_only = yes(&value)?,
             "--size" => {
                 let (width, height) = value.split_once('x')?;

@@ -27,8 +27,8 @@ use crate::{
     truth::{self, FrameTruth, PersonTruth},
 };
 
-/// Pictures taken of one match.
-const PER_MATCH: usize = 4;
+/// Pictures taken of one match when nothing else is said: making a match costs as much as five pictures of it.
+pub const PER_MATCH: usize = 4;
 /// Length of a match, seconds.
 const MATCH_S: f64 = 30.0;
 /// Quality of the JPEG files: above what a broadcast leaves.
@@ -48,6 +48,8 @@ pub struct FrameOptions {
     pub count: usize,
     /// Everything random follows from it.
     pub seed: u64,
+    /// Pictures taken of one match.
+    pub per_match: usize,
     /// Which matches.
     pub split: Split,
     /// Picture size.
@@ -90,19 +92,19 @@ pub fn broadcast_frames(
     options: &FrameOptions,
     progress: impl Fn(usize) + Sync,
 ) -> Result<(), SynthesisError> {
-    if options.count == 0 {
-        return Err(SynthesisError::Options("a set needs at least one picture".into()));
+    if options.count == 0 || options.per_match == 0 {
+        return Err(SynthesisError::Options("a set needs at least one picture, in all and of a match".into()));
     }
     for folder in ["images", "labels", "maps"].iter().filter(|name| **name != "maps" || options.maps) {
         make_folder(&options.out.join(folder))?;
     }
-    let matches = options.count.div_ceil(PER_MATCH);
+    let matches = options.count.div_ceil(options.per_match);
     let finished = AtomicUsize::new(0);
     let lines: Vec<Vec<u8>> = (0..matches)
         .into_par_iter()
         .map(|index| {
-            let first = index * PER_MATCH;
-            let pictures = PER_MATCH.min(options.count - first);
+            let first = index * options.per_match;
+            let pictures = options.per_match.min(options.count - first);
             let lines = one_match(options, index, first..first + pictures)?;
             progress(finished.fetch_add(pictures, Ordering::Relaxed) + pictures);
             Ok(lines)
@@ -213,6 +215,7 @@ mod tests {
             let options = FrameOptions {
                 out: folder.path().join(name),
                 count: 2,
+                per_match: PER_MATCH,
                 seed: 3,
                 split,
                 size_px: (320, 180),

@@ -1,0 +1,158 @@
+"""Trains the pitch network on rendered pictures, logs the curve, keeps the running average of the weights.
+
+    python3 train.py --data ../../target/datasets/frames-train --validation ../../target/datasets/frames-validation --out RUN --minutes 75
+"""
+
+import argparse
+import csv
+import json
+import math
+import queue
+import threading
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch.nn import functional
+
+from dataset import Frames
+from network import PitchNetwork
+from points import CHANNELS, POINTS
+
+BATCH = 8
+WEIGHT_DECAY = 0.02
+AVERAGE = 0.998
+FOUND = 0.25  # a peak above this is a found point
+NEAR_CELLS = 1.5  # and right within this, cells of 4 pixels
+
+
+def batches(data, rng):
+    """Endless shuffled batches: pictures N×3×H×W 0..1 and maps, made by a thread beside the training."""
+    ready = queue.Queue(4)
+
+    def make():
+        order = []
+        while True:
+            if len(order) < BATCH:
+                data.refresh()
+                order = list(rng.permutation(len(data)))
+            ready.put(stack([data.sample(order.pop(), rng) for _ in range(BATCH)]))
+
+    threading.Thread(target=make, daemon=True).start()
+    while True:
+        yield ready.get()
+
+
+def stack(samples):
+    pictures = torch.from_numpy(np.stack([view for view, _ in samples])).permute(0, 3, 1, 2) / 255.0
+    return pictures.contiguous(memory_format=torch.channels_last), torch.from_numpy(np.stack([maps for _, maps in samples]))
+
+
+def loss_of(logits, maps):
+    """Quality focal loss of points and lines (Li et al. 2020: what is already right hardly counts), cross entropy of the area."""
+    shown, wanted = logits[:, : CHANNELS - 1], maps[:, : CHANNELS - 1]
+    entropy = functional.binary_cross_entropy_with_logits(shown, wanted, reduction="none")
+    focal = entropy * (torch.sigmoid(shown) - wanted).square()
+    points = focal[:, :POINTS].sum() / wanted[:, :POINTS].sum().clamp(min=20.0)
+    lines = focal[:, POINTS:].sum() / wanted[:, POINTS:].sum().clamp(min=100.0)
+    area = functional.binary_cross_entropy_with_logits(logits[:, -1], maps[:, -1])
+    return points + lines + 0.3 * area
+
+
+@torch.no_grad()
+def validate(network, samples):
+    """Share of the points found where they are, share of the found points that are right, overlap of the lines."""
+    network.eval()
+    found = right = true = both = either = 0
+    for start in range(0, len(samples), BATCH):
+        pictures, maps = stack(samples[start : start + BATCH])
+        said = torch.sigmoid(network(pictures))
+        peaks, places = said[:, :POINTS].flatten(2).max(2)
+        tops, trues = maps[:, :POINTS].flatten(2).max(2)
+        width = maps.shape[3]
+        dx = (places % width - trues % width).float()
+        dy = (torch.div(places, width, rounding_mode="floor") - torch.div(trues, width, rounding_mode="floor")).float()
+        near = (dx**2 + dy**2).sqrt() <= NEAR_CELLS
+        sure, is_there = peaks > FOUND, tops > 0.6
+        found += sure.sum().item()
+        true += is_there.sum().item()
+        right += (sure & (tops > 0) & near).sum().item()
+        lines, wanted = said[:, POINTS:-1] > 0.4, maps[:, POINTS:-1] > 0.4
+        both += (lines & wanted).sum().item()
+        either += (lines | wanted).sum().item()
+    network.train()
+    return right / max(true, 1), right / max(found, 1), both / max(either, 1)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--validation", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--minutes", type=float, default=75.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rate", type=float, default=3e-3, help="highest learning rate")
+    parser.add_argument("--start", help="checkpoint to go on from")
+    arguments = parser.parse_args()
+
+    torch.set_num_threads(1)
+    cv2.setNumThreads(0)
+    torch.set_flush_denormal(True)
+    torch.manual_seed(arguments.seed)
+    rng = np.random.default_rng(arguments.seed)
+    out = Path(arguments.out)
+    out.mkdir(parents=True, exist_ok=True)
+    data, validation = Frames(arguments.data), Frames(arguments.validation)
+    validation = [validation.sample(index) for index in range(len(validation))]
+    print(f"{len(data)} pictures to train on, {len(validation)} to watch the curve", flush=True)
+    network = PitchNetwork().to(memory_format=torch.channels_last)
+    if arguments.start:
+        network.load_state_dict(torch.load(arguments.start))
+    average = PitchNetwork().to(memory_format=torch.channels_last)
+    average.load_state_dict(network.state_dict())
+    optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
+    curve = csv.writer((out / "curve.csv").open("w", newline=""))
+    curve.writerow(["seconds", "samples", "loss", "validation_point_recall", "validation_point_precision", "validation_line_iou"])
+
+    began, budget = time.time(), arguments.minutes * 60.0
+    seen, steps, running, reported = 0, 0, None, 0.0
+    supply = batches(data, rng)
+    while True:
+        elapsed = time.time() - began
+        part = elapsed / budget
+        if part >= 1.0 or elapsed - reported >= min(240.0, budget / 3):
+            reported = elapsed
+            recall, precision, overlap = validate(average, validation)
+            curve.writerow([f"{elapsed:.0f}", seen, f"{running or 0:.4f}", f"{recall:.4f}", f"{precision:.4f}", f"{overlap:.4f}"])
+            print(f"{elapsed:.0f} s, {seen} samples, loss {running or 0:.3f}, points found {recall:.3f}, right {precision:.3f}, lines {overlap:.3f}", flush=True)
+            torch.save(average.state_dict(), out / "average.pt")
+            torch.save(network.state_dict(), out / "network.pt")
+        if part >= 1.0:
+            break
+        rate = arguments.rate * min(1.0, (steps + 1) / 150) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
+        for group in optimizer.param_groups:
+            group["lr"] = rate
+        pictures, maps = next(supply)
+        loss = loss_of(network(pictures), maps)
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
+        optimizer.step()
+        steps += 1
+        seen += BATCH
+        running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()
+        with torch.no_grad():
+            keep = min(AVERAGE, steps / (steps + 20))
+            for mean, value in zip(average.state_dict().values(), network.state_dict().values()):
+                if mean.dtype.is_floating_point:
+                    mean.lerp_(value, 1 - keep)
+                else:
+                    mean.copy_(value)
+    summary = {"samples_seen": seen, "training_samples": len(data), "minutes": arguments.minutes, "seed": arguments.seed}
+    (out / "run.json").write_text(json.dumps(summary))
+
+
+if __name__ == "__main__":
+    main()
