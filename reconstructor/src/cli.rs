@@ -172,12 +172,19 @@ pub(crate) struct EvaluateRealism {
 
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateCalibration {
-    /// Folder that `synthesize` wrote, or SoccerNet keypoints (`pitch_points.json`, `images/`, `labels/`).
+    /// Folder that `synthesize` or `cargo xtask dataset frames-test` wrote, SoccerNet keypoints (`pitch_points.json`, `images/`,
+    /// `labels/`), or World Cup 2014 homographies (`homographies.json`).
     #[arg(long, value_name = "DIR")]
     pub(crate) data: PathBuf,
     /// Where the figures go.
     #[arg(long, value_name = "FILE")]
     pub(crate) json: PathBuf,
+    /// Give four annotated points of each picture, as a person would, and measure at the others.
+    #[arg(long)]
+    pub(crate) clicks: bool,
+    /// Leave a part of the fit out, to see what it is worth; may be repeated.
+    #[arg(long, value_name = "PART")]
+    pub(crate) without: Vec<reconstructor::evaluate::calibration::Part>,
 }
 
 #[derive(Debug, Args)]

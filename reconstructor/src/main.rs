@@ -65,7 +65,11 @@ fn run(command: Command) -> Result<()> {
         }
         Command::Evaluate(Evaluate::Calibration(arguments)) => {
             let progress = Progress::new("calibration", 0);
-            let figures = evaluate::calibration::evaluate(&arguments.data, &progress)?;
+            let options = evaluate::calibration::EvaluationOptions {
+                clicks: arguments.clicks,
+                without: arguments.without,
+            };
+            let figures = evaluate::calibration::evaluate(&arguments.data, &options, &progress)?;
             drop(progress);
             write_figures(&arguments.json, &figures)
         }

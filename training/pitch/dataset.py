@@ -109,6 +109,27 @@ class Frames:
     def __len__(self):
         return len(self.cameras)
 
+    def weight(self, index):
+        """How often a picture is drawn: most play is round the centre circle, but most of what is shown again is before a goal."""
+        camera, pitch = self.cameras[index], self.pitches[index]
+        pixels, good = camera.project(points(pitch["length_m"], pitch["width_m"]))
+        inside = good & (pixels > 0).all(1) & (pixels < camera.size).all(1)
+        centre, ends = inside[:7].sum(), inside[7:].sum()
+        if camera.behind or not inside.any():
+            return 1.0
+        return 4.0 if ends >= 4 and centre <= 2 else 1.5 if ends >= 4 else 0.6
+
+    def _end(self, index):
+        """Where the penalty area in view is, pixels; none when none is."""
+        camera, pitch = self.cameras[index], self.pitches[index]
+        pixels, good = camera.project(points(pitch["length_m"], pitch["width_m"]))
+        for first in (7, 25):
+            seen = pixels[first : first + 18][good[first : first + 18]]
+            seen = seen[(seen > 0).all(1) & (seen < camera.size).all(1)]
+            if len(seen) >= 4 and not camera.behind:
+                return seen.mean(0)
+        return None
+
     def sample(self, index, rng=None):
         """Picture (HEIGHT, WIDTH, 3) float 0..255 and target maps; cropped, turned, mirrored and recoloured with `rng`."""
         picture, camera = self.pictures[index], self.cameras[index]
@@ -118,7 +139,7 @@ class Frames:
         flip = False
         if rng is not None:
             flip = rng.random() < 0.5
-            affine = _drawn_affine(rng, width, height, flip)
+            affine = _drawn_affine(rng, width, height, flip, self._end(index) if rng.random() < 0.5 else None)
         maps = targets(camera, self.pitches[index], affine)
         view = cv2.warpAffine(picture, affine, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101)
         if flip:
@@ -129,16 +150,21 @@ class Frames:
         return view, maps
 
 
-def _drawn_affine(rng, width, height, flip):
-    """A window of the picture, a little turned and stretched, as pixels to pixels of the input; mirrored when `flip`."""
+def _drawn_affine(rng, width, height, flip, towards=None):
+    """A window of the picture, a little turned and stretched, as pixels to pixels of the input; mirrored when `flip`; round `towards` when given."""
     zoom = np.exp(rng.uniform(0.0, 0.5)) if rng.random() < 0.7 else 1.0
+    if towards is not None:
+        zoom = np.exp(rng.uniform(0.2, 0.8))
     stretch = np.exp(rng.normal(0.0, 0.04, 2))
     angle = np.radians(rng.normal(0.0, 1.2))
     scale = np.maximum(WIDTH / width * zoom * stretch, WIDTH / width)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     linear = np.diag(scale) @ turn
     free = np.maximum(np.array([width, height]) - np.array([WIDTH, HEIGHT]) / scale, 0.0) / 2
-    middle = (np.array([width, height]) - 1) / 2 + rng.uniform(-1, 1, 2) * free
+    whole = (np.array([width, height]) - 1) / 2
+    middle = whole + rng.uniform(-1, 1, 2) * free
+    if towards is not None:
+        middle = whole + np.clip(towards + rng.normal(0.0, 0.08 * width, 2) - whole, -free, free)
     if flip:
         linear[0] = -linear[0]
     shift = (np.array([WIDTH, HEIGHT]) - 1) / 2 - linear @ middle

@@ -37,7 +37,8 @@ def batches(data, rng):
         while True:
             if len(order) < BATCH:
                 data.refresh()
-                order = list(rng.permutation(len(data)))
+                weights = np.array([data.weight(index) for index in range(len(data))])
+                order = list(rng.choice(len(data), len(data), p=weights / weights.sum()))
             ready.put(stack([data.sample(order.pop(), rng) for _ in range(BATCH)]))
 
     threading.Thread(target=make, daemon=True).start()

@@ -12,6 +12,7 @@ mod initial;
 mod input;
 mod least_squares;
 mod lines;
+pub(crate) mod locate;
 pub mod overlay;
 mod sequence;
 pub mod soccernet;

@@ -6,8 +6,9 @@
 //! all parts.
 
 use std::{
+    cmp::Ordering,
     path::PathBuf,
-    sync::atomic::{AtomicUsize, Ordering},
+    sync::atomic::{self, AtomicUsize},
 };
 
 use image::{ImageEncoder, RgbImage, codecs::jpeg::JpegEncoder};
@@ -29,6 +30,8 @@ use crate::{
 
 /// Pictures taken of one match when nothing else is said: making a match costs as much as five pictures of it.
 pub const PER_MATCH: usize = 4;
+/// Frames of which the one nearest to a goal is taken.
+const TOWARDS_GOAL: usize = 5;
 /// Length of a match, seconds.
 const MATCH_S: f64 = 30.0;
 /// Quality of the JPEG files: above what a broadcast leaves.
@@ -93,7 +96,9 @@ pub fn broadcast_frames(
     progress: impl Fn(usize) + Sync,
 ) -> Result<(), SynthesisError> {
     if options.count == 0 || options.per_match == 0 {
-        return Err(SynthesisError::Options("a set needs at least one picture, in all and of a match".into()));
+        return Err(SynthesisError::Options(
+            "a set needs at least one picture, in all and of a match".into(),
+        ));
     }
     for folder in ["images", "labels", "maps"].iter().filter(|name| **name != "maps" || options.maps) {
         make_folder(&options.out.join(folder))?;
@@ -106,7 +111,7 @@ pub fn broadcast_frames(
             let first = index * options.per_match;
             let pictures = options.per_match.min(options.count - first);
             let lines = one_match(options, index, first..first + pictures)?;
-            progress(finished.fetch_add(pictures, Ordering::Relaxed) + pictures);
+            progress(finished.fetch_add(pictures, atomic::Ordering::Relaxed) + pictures);
             Ok(lines)
         })
         .collect::<Result<_, SynthesisError>>()?;
@@ -142,7 +147,7 @@ fn one_match(
     let mut rng = rng(seed, &[0xF4B]);
     let mut lines = Vec::new();
     for picture in pictures {
-        let frame = rng.random_range(0..frames);
+        let frame = drawn_frame(&fixture, &mut rng);
         let drawn = render_frame(&fixture, frame, seed)?;
         let (truth, maps) = truth::measure(&fixture, &fixture.scene(frame), frame, options.maps);
         let name = format!("{picture:06}");
@@ -154,12 +159,32 @@ fn one_match(
                 put(&options.out.join("maps").join(format!("{name}-{kind}.png")), &file)?;
             }
         }
-        let line = Line { name, match_seed: seed, pitch: fixture.stadium.pitch, everybody: everybody.clone(), truth };
+        let line = Line {
+            name,
+            match_seed: seed,
+            pitch: fixture.stadium.pitch,
+            everybody: everybody.clone(),
+            truth,
+        };
         serde_json::to_writer(&mut lines, &line)
             .map_err(|error| SynthesisError::Options(error.to_string()))?;
         lines.push(b'\n');
     }
     Ok(lines)
+}
+
+/// Any frame of a match; every second time the one of several that looks nearest to a goal: play is there more seldom than
+/// broadcasts show it.
+fn drawn_frame(fixture: &Fixture, rng: &mut impl Rng) -> usize {
+    let frames = fixture.cameras.len();
+    let tries = if rng.random_bool(0.5) { TOWARDS_GOAL } else { 1 };
+    let aim = |frame: &usize| {
+        let camera = fixture.cameras.get(*frame)?;
+        Some(camera.ground_point(camera.centre_px())?.x.abs())
+    };
+    let drawn: Vec<usize> = (0..tries).map(|_| rng.random_range(0..frames)).collect();
+    let nearest = drawn.iter().copied().max_by(|a, b| aim(a).partial_cmp(&aim(b)).unwrap_or(Ordering::Equal));
+    nearest.unwrap_or(0) // at least one is drawn
 }
 
 fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, SynthesisError> {

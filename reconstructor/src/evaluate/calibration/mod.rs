@@ -1,17 +1,21 @@
 //! How near the cameras are to the truth: reprojection error at 960×540, completeness, overlap of the visible pitch.
 //!
-//! Two kinds of folders. A rendered clip (`truth.json`, `clip.mp4`, `correspondences.json`): every camera is known. Annotated
-//! pictures (`pitch_points.json`, `images/`, `labels/`, SoccerNet's keypoints in the YOLO pose format): four of the
-//! annotated points of each picture are given to the fit, and the error is taken at the others only.
+//! Four kinds of folders: a rendered clip (`truth.json`, `clip.mp4`, `correspondences.json`) and rendered pictures (`frames.jsonl`,
+//! `images/`), where every camera is known; annotated pictures (`pitch_points.json`, `images/`, `labels/`: SoccerNet's keypoints
+//! in the YOLO pose format); pictures with homographies (`homographies.json`: World Cup 2014).
 
 mod annotated;
+mod figures;
+mod homographies;
+mod rendered;
 
 use std::{
     io::Read,
     path::{Path, PathBuf},
 };
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
+use image::{ImageReader, RgbImage};
 use protocol::{
     camera::Camera,
     pitch::{
@@ -19,15 +23,20 @@ use protocol::{
         PENALTY_AREA_DEPTH_M, PENALTY_AREA_WIDTH_M, PENALTY_MARK_M, Pitch,
     },
 };
-use serde::{Deserialize, Serialize};
+use rayon::prelude::*;
 
 pub use annotated::{AnnotatedView, annotated_views};
+pub use figures::CalibrationFigures;
 
 use crate::{
-    calibration::{Calibration, CalibrationError, calibrate},
-    ingest::Clip,
+    calibration::{
+        CalibrationError,
+        locate::{Located, Locator, Terms},
+    },
+    inference::InferenceError,
     report::Progress,
 };
+use figures::FrameErrors;
 
 /// Errors are stated for pictures of this width, whatever the picture's own.
 const STATED_WIDTH_PX: f64 = 960.0;
@@ -35,39 +44,52 @@ const STATED_WIDTH_PX: f64 = 960.0;
 const LEAST_POINTS: usize = 5;
 /// Most bytes of one text file of a data folder.
 const MAX_FILE_BYTES: u64 = 512 << 20;
-/// Spacing of the grid on which the overlap of visible pitch areas is counted, metres.
-const AREA_GRID_M: f64 = 0.5;
 
-/// Figures of the calibration stage.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct CalibrationFigures {
-    /// Frames with at least five annotated points.
-    pub frames: usize,
-    /// Of these, frames that got a camera.
-    pub solved: usize,
-    /// `solved / frames`.
-    pub completeness: f64,
-    /// Points at which the error is measured.
-    pub points: usize,
-    /// Median reprojection error over all points, pixels at 960×540.
-    pub reprojection_error_median_px: f64,
-    /// Below this lie 95 % of the points, pixels at 960×540.
-    pub reprojection_error_p95_px: f64,
-    /// Root mean square error, pixels at 960×540.
-    pub reprojection_error_rms_px: f64,
-    /// Mean overlap of the visible pitch areas (intersection over union), where the true camera is known.
-    pub iou_part_mean: Option<f64>,
-    /// Median over frames of the line residual that the stage reports, pixels of the picture.
-    pub line_residual_median_px: f64,
+/// A part of the fit that can be left out, to see what it is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Part {
+    /// Named points.
+    Points,
+    /// Named lines, and the crossings of lines drawn on.
+    Lines,
+    /// Radial distortion.
+    K1,
+    /// Where broadcast cameras usually stand.
+    Priors,
+    /// The last step onto the painted lines of the picture.
+    Polish,
+}
+
+/// How the stage is evaluated.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EvaluationOptions {
+    /// Give four annotated points of each picture, as a person would, instead of finding the camera without.
+    pub clicks: bool,
+    /// Leave these parts out.
+    pub without: Vec<Part>,
+}
+
+impl EvaluationOptions {
+    fn terms(&self) -> Terms {
+        let with = |part| !self.without.contains(&part);
+        Terms {
+            points: with(Part::Points),
+            lines: with(Part::Lines),
+            priors: with(Part::Priors),
+            radial: with(Part::K1),
+            polish: with(Part::Polish),
+        }
+    }
 }
 
 /// Why the stage could not be evaluated on a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationEvaluationError {
-    /// The folder holds neither kind of truth.
+    /// The folder holds no kind of truth.
     #[error(
-        "{path}: neither truth.json (a rendered clip) nor pitch_points.json (annotated pictures) is in it; give a folder \
-         that `reconstructor synthesize` wrote, or SoccerNet keypoints"
+        "{path}: none of truth.json (a rendered clip), frames.jsonl (rendered pictures), pitch_points.json (annotated pictures) \
+         and homographies.json is in it; give a folder that `reconstructor synthesize` or `cargo xtask dataset frames-test` \
+         wrote, SoccerNet keypoints or World Cup 2014 homographies"
     )]
     NoTruth {
         /// The folder.
@@ -84,120 +106,104 @@ pub enum CalibrationEvaluationError {
     /// The stage itself failed on the whole clip.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// The network failed.
+    #[error(transparent)]
+    Inference(#[from] InferenceError),
 }
 
 /// Evaluates the stage on a folder with truth.
 ///
 /// # Errors
 /// When the folder has no truth that can be read, or its clip cannot be calibrated at all.
-pub fn evaluate(data: &Path, progress: &Progress) -> Result<CalibrationFigures, CalibrationEvaluationError> {
-    if data.join("truth.json").is_file() {
-        rendered_clip(data, progress)
+pub fn evaluate(
+    data: &Path,
+    options: &EvaluationOptions,
+    progress: &Progress,
+) -> Result<CalibrationFigures, CalibrationEvaluationError> {
+    let figures = if data.join("truth.json").is_file() {
+        rendered::clip(data, progress)?
+    } else if data.join("frames.jsonl").is_file() {
+        rendered::pictures(data, options, progress)?
     } else if data.join("pitch_points.json").is_file() {
-        annotated::evaluate(data, progress)
+        annotated::evaluate(data, options, progress)?
+    } else if data.join("homographies.json").is_file() {
+        homographies::evaluate(data, options, progress)?
     } else {
-        Err(CalibrationEvaluationError::NoTruth { path: data.into() })
-    }
+        return Err(CalibrationEvaluationError::NoTruth { path: data.into() });
+    };
+    let mode = if options.clicks { "four points given" } else { "automatic" };
+    let without = options.without.iter().map(|part| format!("{part:?}").to_lowercase()).collect();
+    Ok(CalibrationFigures { mode, without, ..figures })
 }
 
-/// Errors of one frame.
-#[derive(Clone, Debug, Default)]
-struct FrameErrors {
-    solved: bool,
-    errors_px: Vec<f64>,
-    iou: Option<f64>,
-    line_residual_px: Option<f64>,
+/// What was measured on one picture after another, and the processor time of it.
+struct Measured {
+    frames: Vec<FrameErrors>,
+    cpu_s: f64,
+    network_s: f64,
 }
 
-fn summary(frames: &[FrameErrors]) -> CalibrationFigures {
-    let mut errors: Vec<f64> = frames.iter().flat_map(|frame| frame.errors_px.iter().copied()).collect();
-    errors.sort_by(f64::total_cmp);
-    let at = |share: f64| errors.get((share * errors.len() as f64) as usize).copied().unwrap_or(f64::NAN);
-    let ious: Vec<f64> = frames.iter().filter_map(|frame| frame.iou).collect();
-    let mut residuals: Vec<f64> = frames.iter().filter_map(|frame| frame.line_residual_px).collect();
-    residuals.sort_by(f64::total_cmp);
-    let solved = frames.iter().filter(|frame| frame.solved).count();
-    CalibrationFigures {
-        frames: frames.len(),
-        solved,
-        completeness: solved as f64 / frames.len().max(1) as f64,
-        points: errors.len(),
-        reprojection_error_median_px: at(0.5),
-        reprojection_error_p95_px: at(0.95),
-        reprojection_error_rms_px: (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64)
-            .sqrt(),
-        iou_part_mean: (!ious.is_empty()).then(|| ious.iter().sum::<f64>() / ious.len() as f64),
-        line_residual_median_px: residuals.get(residuals.len() / 2).copied().unwrap_or(f64::NAN),
-    }
-}
-
-#[derive(Deserialize)]
-struct Truth {
-    pitch: Pitch,
-}
-
-#[derive(Deserialize)]
-struct TrueFrame {
-    camera: Camera,
-}
-
-fn rendered_clip(data: &Path, progress: &Progress) -> Result<CalibrationFigures, CalibrationEvaluationError> {
-    let truth: Truth = parse(&data.join("truth.json"))?;
-    let true_frames: Vec<TrueFrame> = parse_lines(&data.join("frames.jsonl"))?;
-    let given = Calibration::read(&data.join("correspondences.json"))?;
-    let clip = Clip::open(&data.join("clip.mp4"), None).map_err(CalibrationError::from)?;
-    let estimates = calibrate(&clip, &[], &given, progress)?;
-    let points = pitch_points(&truth.pitch);
-    let frames: Vec<FrameErrors> = true_frames
-        .iter()
-        .zip(&estimates)
-        .filter_map(|(truth_frame, estimate)| {
-            let true_camera = &truth_frame.camera;
-            let seen: Vec<DVec3> = points
-                .iter()
-                .copied()
-                .filter(|&point| true_camera.project(point).is_some_and(|pixel| true_camera.contains(pixel)))
-                .collect();
-            if seen.len() < LEAST_POINTS {
-                return None;
-            }
-            let Some(camera) = &estimate.camera else { return Some(FrameErrors::default()) };
-            let pairs = seen.iter().filter_map(|&point| Some((point, true_camera.project(point)?)));
-            Some(FrameErrors {
-                solved: true,
-                errors_px: reprojection_errors_px(camera, pairs),
-                iou: Some(iou_part(true_camera, camera, &truth.pitch)),
-                line_residual_px: estimate.line_residual_median_px,
-            })
-        })
-        .collect();
-    Ok(summary(&frames))
-}
-
-/// Distances between given pixels and where a camera sees the points, in pixels at 960×540.
-fn reprojection_errors_px(camera: &Camera, points: impl Iterator<Item = (DVec3, DVec2)>) -> Vec<f64> {
-    let scale = STATED_WIDTH_PX / f64::from(camera.width_px);
-    // A point behind the camera is as wrong as a point can be: the diagonal of the picture.
-    let behind = STATED_WIDTH_PX * 1.15;
-    points.map(|(point, pixel)| camera.project(point).map_or(behind, |p| p.distance(pixel) * scale)).collect()
-}
-
-/// Overlap (intersection over union) of the parts of the pitch that two cameras show.
-fn iou_part(a: &Camera, b: &Camera, pitch: &Pitch) -> f64 {
-    let shows =
-        |camera: &Camera, point: DVec3| camera.project(point).is_some_and(|pixel| camera.contains(pixel));
-    let (columns, rows) = ((pitch.length_m / AREA_GRID_M) as u32, (pitch.width_m / AREA_GRID_M) as u32);
-    let (mut both, mut either) = (0_u32, 0_u32);
-    for column in 0..columns {
-        for row in 0..rows {
-            let x = (f64::from(column) + 0.5) * AREA_GRID_M - pitch.length_m / 2.0;
-            let z = (f64::from(row) + 0.5) * AREA_GRID_M - pitch.width_m / 2.0;
-            let (in_a, in_b) = (shows(a, DVec3::new(x, 0.0, z)), shows(b, DVec3::new(x, 0.0, z)));
-            both += u32::from(in_a && in_b);
-            either += u32::from(in_a || in_b);
+impl Measured {
+    fn figures(&self) -> CalibrationFigures {
+        let per_frame = |seconds: f64| (seconds > 0.0).then(|| seconds / self.frames.len().max(1) as f64);
+        CalibrationFigures {
+            cpu_s_per_frame: per_frame(self.cpu_s),
+            network_s_per_frame: per_frame(self.network_s),
+            ..figures::summary(&self.frames)
         }
     }
-    if either == 0 { 0.0 } else { f64::from(both) / f64::from(either) }
+}
+
+/// Finds the camera of each item's picture, several at a time, and measures it; `None` of `measure` leaves the item out.
+fn locate_each<T: Sync>(
+    items: &[T],
+    options: &EvaluationOptions,
+    progress: &Progress,
+    measure: impl Fn(&T, &mut Finder) -> Result<Option<FrameErrors>, CalibrationEvaluationError> + Sync,
+) -> Result<Measured, CalibrationEvaluationError> {
+    let share = items.len().div_ceil(rayon::current_num_threads()).max(1);
+    let parts: Vec<Measured> = items
+        .par_chunks(share)
+        .map(|items| {
+            let mut finder = Finder { locator: Locator::load()?.with_terms(options.terms()), cpu_s: 0.0 };
+            let mut frames = Vec::new();
+            for item in items {
+                frames.extend(measure(item, &mut finder)?);
+                progress.advance(1);
+            }
+            Ok(Measured { frames, cpu_s: finder.cpu_s, network_s: finder.locator.network_s() })
+        })
+        .collect::<Result<_, CalibrationEvaluationError>>()?;
+    let sum = |of: &dyn Fn(&Measured) -> f64| parts.iter().map(of).sum();
+    let (cpu_s, network_s) = (sum(&|part| part.cpu_s), sum(&|part| part.network_s));
+    Ok(Measured { frames: parts.into_iter().flat_map(|part| part.frames).collect(), cpu_s, network_s })
+}
+
+/// The automatic camera of single pictures, with the time it takes.
+struct Finder {
+    locator: Locator,
+    cpu_s: f64,
+}
+
+impl Finder {
+    /// The camera if the stage is sure enough of it, and its confidence if it has any guess.
+    fn find(
+        &mut self,
+        picture: &RgbImage,
+        pitch: &Pitch,
+    ) -> Result<(Option<Camera>, Option<f64>), InferenceError> {
+        let started = crate::report::thread_cpu_s();
+        let guess: Option<Located> = self.locator.guess(picture, &[], pitch)?.ok();
+        self.cpu_s += crate::report::thread_cpu_s() - started;
+        let camera = guess.filter(Located::is_sure).map(|located| located.camera);
+        Ok((camera, guess.map(|located| located.confidence)))
+    }
+}
+
+fn open_picture(path: &Path) -> Result<RgbImage, CalibrationEvaluationError> {
+    let unreadable = |reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
+    let reader = ImageReader::open(path).map_err(|e| unreadable(e.to_string()))?;
+    Ok(reader.decode().map_err(|e| unreadable(e.to_string()))?.into_rgb8())
 }
 
 /// Points of a pitch that people annotate: corners, crossings, marks, posts and crossbar ends.
@@ -256,32 +262,9 @@ fn parse_lines<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<T>, Ca
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
-
-    fn camera() -> Camera {
-        Camera::looking_at((1920, 1080), 2600.0, DVec3::new(0.0, 18.0, 75.0), DVec3::new(5.0, 0.0, -5.0))
-    }
-
-    #[test]
-    fn errors_are_stated_at_960_pixels() {
-        let camera = camera();
-        let shifted = camera.project(DVec3::ZERO).unwrap() + DVec2::new(6.0, 8.0);
-        let errors = reprojection_errors_px(&camera, [(DVec3::ZERO, shifted)].into_iter());
-        assert!((errors[0] - 5.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_same_camera_overlaps_fully_and_another_partly() {
-        let pitch = Pitch::default();
-        assert_eq!(iou_part(&camera(), &camera(), &pitch), 1.0);
-        let other = Camera::looking_at(
-            (1920, 1080),
-            2600.0,
-            DVec3::new(0.0, 18.0, 75.0),
-            DVec3::new(15.0, 0.0, -5.0),
-        );
-        assert!((0.3..0.9).contains(&iou_part(&camera(), &other, &pitch)));
-    }
 
     #[test]
     fn every_annotated_point_lies_on_a_marking_or_the_goal() {
@@ -298,10 +281,10 @@ mod tests {
     #[test]
     fn a_folder_without_truth_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let error = evaluate(folder.path(), &Progress::hidden()).unwrap_err();
-        assert!(matches!(error, CalibrationEvaluationError::NoTruth { .. }));
+        let run = || evaluate(folder.path(), &EvaluationOptions::default(), &Progress::hidden()).unwrap_err();
+        assert!(matches!(run(), CalibrationEvaluationError::NoTruth { .. }));
         std::fs::write(folder.path().join("truth.json"), "{}").unwrap();
-        let error = evaluate(folder.path(), &Progress::hidden()).unwrap_err();
+        let error = run();
         assert!(error.to_string().contains("truth.json"), "{error}");
     }
 }

@@ -1,0 +1,181 @@
+//! The camera of one picture without any help: a network names points and lines of the pitch, two-point hypotheses from where
+//! broadcast cameras stand explain them, a robust fit on points and lines refines the best, and the painted lines of the
+//! picture itself settle it (section 4.1, whose four clicked points this replaces).
+//!
+//! The world is turned so that the camera stands on the near side or behind the left goal: from the picture alone nobody
+//! can tell these from their opposites.
+
+mod confidence;
+mod crossings;
+mod evidence;
+mod hypotheses;
+mod names;
+mod refine;
+#[cfg(test)]
+mod tests;
+
+use image::RgbImage;
+use protocol::{camera::Camera, pitch::Pitch};
+
+use super::{
+    fit::{Expectation, fit, residual},
+    least_squares::RADIAL,
+    lines::LinePixels,
+    sequence, template,
+};
+use crate::{
+    geometry::PixelBox,
+    inference::{InferenceError, Model},
+    report::thread_cpu_s,
+};
+use confidence::Agreement;
+use evidence::Evidence;
+use hypotheses::Pair;
+pub(crate) use refine::Terms;
+use refine::{Named, refine};
+
+/// File name of the network in `assets/models`.
+pub(crate) const MODEL: &str = "pitch.onnx";
+
+/// Fewer named points and crossings than this fix no camera.
+const PAIRS_MIN: usize = 3;
+/// A camera below this confidence is no camera.
+pub(crate) const CONFIDENCE_MIN: f64 = 0.5;
+/// The painted lines may move the network's camera by this much: standard deviations of log focal length, rotation (radians),
+/// position (m) and k1.
+const POLISH_SIGMA: [f64; 8] = [0.04, 0.010, 0.010, 0.006, 2.0, 2.0, 2.0, 0.03];
+
+/// A camera found in a picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Located {
+    /// The camera.
+    pub(crate) camera: Camera,
+    /// Probability 0..1 that it is right to a hundredth of the picture's width, as measured on rendered pictures.
+    pub(crate) confidence: f64,
+}
+
+impl Located {
+    /// Whether the camera is to be used.
+    pub(crate) fn is_sure(&self) -> bool {
+        self.confidence >= CONFIDENCE_MIN
+    }
+}
+
+/// Finds cameras in pictures; one per thread.
+#[derive(Debug)]
+pub(crate) struct Locator {
+    model: Model,
+    terms: Terms,
+    network_s: f64,
+}
+
+impl Locator {
+    /// Loads the network.
+    ///
+    /// # Errors
+    /// When ONNX Runtime or the model is missing or unusable.
+    pub(crate) fn load() -> Result<Self, InferenceError> {
+        Ok(Self { model: Model::load_shipped(MODEL)?, terms: Terms::default(), network_s: 0.0 })
+    }
+
+    /// The same with some terms of the fit left out.
+    pub(crate) fn with_terms(self, terms: Terms) -> Self {
+        Self { terms, ..self }
+    }
+
+    /// Processor time that the network took so far, seconds.
+    pub(crate) fn network_s(&self) -> f64 {
+        self.network_s
+    }
+
+    /// The camera of a picture of a pitch of known size; `people` hide lines. `Err` in the inner result says in plain words why
+    /// there is none.
+    ///
+    /// # Errors
+    /// When the network fails.
+    pub(crate) fn locate(
+        &mut self,
+        picture: &RgbImage,
+        people: &[PixelBox],
+        pitch: &Pitch,
+    ) -> Result<Result<Located, String>, InferenceError> {
+        let guess = self.guess(picture, people, pitch)?;
+        Ok(guess.and_then(|located| {
+            let unsure = || {
+                format!(
+                    "no pitch camera here: the best guess is right with probability {:.2}",
+                    located.confidence
+                )
+            };
+            located.is_sure().then_some(located).ok_or_else(unsure)
+        }))
+    }
+
+    /// As [`locate`](Self::locate), however unsure.
+    ///
+    /// # Errors
+    /// When the network fails.
+    pub(crate) fn guess(
+        &mut self,
+        picture: &RgbImage,
+        people: &[PixelBox],
+        pitch: &Pitch,
+    ) -> Result<Result<Located, String>, InferenceError> {
+        let started = thread_cpu_s();
+        let evidence = evidence::find(&mut self.model, picture)?;
+        self.network_s += thread_cpu_s() - started;
+        let named = Named::new(pitch);
+        Ok(explain(&evidence, &named, pitch, self.terms).map(|(mut camera, _)| {
+            if self.terms.polish {
+                camera = polish(&camera, picture, people, pitch, self.terms);
+            }
+            let agreement = Agreement::of(&camera, &evidence, &named);
+            tracing::debug!(?agreement, "camera from named points and lines");
+            Located { camera, confidence: agreement.confidence() }
+        }))
+    }
+}
+
+/// The camera that explains the evidence best, and its cost.
+fn explain(evidence: &Evidence, named: &Named, pitch: &Pitch, terms: Terms) -> Result<(Camera, f64), String> {
+    let mut pairs: Vec<Pair> = evidence
+        .points
+        .iter()
+        .filter_map(|point| {
+            let world = *named.points.get(point.name).filter(|world| world.y == 0.0)?;
+            Some(Pair { world, pixel: point.pixel, weight: point.score })
+        })
+        .collect();
+    if terms.lines {
+        pairs.extend(crossings::crossings(evidence, pitch));
+    }
+    if pairs.len() < PAIRS_MIN {
+        return Err(format!("no pitch camera here: {} points of a pitch are seen", pairs.len()));
+    }
+    hypotheses::hypotheses(&pairs, evidence, pitch)
+        .iter()
+        .map(|start| refine(start, evidence, named, terms))
+        .filter(|(camera, cost)| cost.is_finite() && camera.position.y > 2.0)
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .ok_or_else(|| "no pitch camera here: no camera sees the points where they are".to_owned())
+}
+
+/// The camera moved onto the painted lines of the picture, when these agree with it better there.
+fn polish(camera: &Camera, picture: &RgbImage, people: &[PixelBox], pitch: &Pitch, terms: Terms) -> Camera {
+    let lines = LinePixels::find(picture, people);
+    let map = lines.map();
+    let samples = template::samples(pitch);
+    let mut sigma = POLISH_SIGMA;
+    if !terms.radial {
+        sigma[RADIAL] = 0.0;
+    }
+    let before = residual(camera, &samples, people, &map);
+    let mut moved = *camera;
+    // Twice: the points that are visible are chosen again once the camera is better.
+    for _ in 0..2 {
+        moved = fit(&Expectation { camera: moved, sigma }, &samples, people, &map);
+    }
+    let after = residual(&moved, &samples, people, &map);
+    let better = after.1 >= sequence::LEAST_POINTS && after.0.zip(before.0).is_some_and(|(a, b)| a <= b);
+    if better { moved } else { *camera }
+}

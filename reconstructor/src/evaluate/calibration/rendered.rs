@@ -1,0 +1,144 @@
+//! Rendered clips and rendered pictures, whose cameras are known.
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use protocol::{camera::Camera, pitch::Pitch};
+use serde::Deserialize;
+
+use super::{
+    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS,
+    figures::{FrameErrors, iou_part, jac5, reprojection_errors_px, summary, turned},
+    locate_each, open_picture, parse, parse_lines, pitch_points,
+};
+use crate::{
+    calibration::{Calibration, CalibrationError, calibrate},
+    ingest::Clip,
+    report::Progress,
+};
+
+/// Spacing of the pixels at which the error on the ground is taken, as a share of the picture's width.
+const GROUND_STEP: f64 = 1.0 / 16.0;
+
+#[derive(Deserialize)]
+struct Truth {
+    pitch: Pitch,
+}
+
+#[derive(Deserialize)]
+struct TrueFrame {
+    camera: Camera,
+}
+
+/// A rendered clip with the correspondences that came with it.
+pub(super) fn clip(
+    data: &Path,
+    progress: &Progress,
+) -> Result<CalibrationFigures, CalibrationEvaluationError> {
+    let truth: Truth = parse(&data.join("truth.json"))?;
+    let true_frames: Vec<TrueFrame> = parse_lines(&data.join("frames.jsonl"))?;
+    let given = Calibration::read(&data.join("correspondences.json"))?;
+    let clip = Clip::open(&data.join("clip.mp4"), None).map_err(CalibrationError::from)?;
+    let estimates = calibrate(&clip, &[], &given, progress)?;
+    let points = pitch_points(&truth.pitch);
+    let frames: Vec<FrameErrors> = true_frames
+        .iter()
+        .zip(&estimates)
+        .filter_map(|(frame, estimate)| {
+            let seen = seen(&frame.camera, &points);
+            (seen.len() >= LEAST_POINTS).then(|| FrameErrors {
+                line_residual_px: estimate.line_residual_median_px,
+                ..errors(&frame.camera, estimate.camera.as_ref(), &truth.pitch, &seen)
+            })
+        })
+        .collect();
+    Ok(summary(&frames))
+}
+
+#[derive(Deserialize)]
+struct PictureTruth {
+    name: String,
+    pitch: Pitch,
+    camera: Camera,
+    shot: ShotTruth,
+}
+
+#[derive(Deserialize)]
+struct ShotTruth {
+    kind: String,
+}
+
+/// Rendered pictures, each alone.
+pub(super) fn pictures(
+    data: &Path,
+    options: &EvaluationOptions,
+    progress: &Progress,
+) -> Result<CalibrationFigures, CalibrationEvaluationError> {
+    let truths: Vec<PictureTruth> = parse_lines(&data.join("frames.jsonl"))?;
+    let measured = locate_each(&truths, options, progress, |truth, finder| {
+        let picture = open_picture(&data.join("images").join(&truth.name).with_extension("jpg"))?;
+        let (camera, confidence) = finder.find(&picture, &truth.pitch)?;
+        if truth.shot.kind == "close-up" {
+            let false_camera = Some(camera.is_some());
+            return Ok(Some(FrameErrors { false_camera, confidence, ..FrameErrors::default() }));
+        }
+        let points = pitch_points(&truth.pitch);
+        let of = |true_camera: &Camera| {
+            errors(true_camera, camera.as_ref(), &truth.pitch, &seen(true_camera, &points))
+        };
+        let (straight, half_turned) = (of(&truth.camera), of(&turned(&truth.camera)));
+        let sum = |frame: &FrameErrors| frame.errors_px.iter().sum::<f64>();
+        let turned = sum(&half_turned) < sum(&straight);
+        let better = if turned { half_turned } else { straight };
+        Ok((seen(&truth.camera, &points).len() >= LEAST_POINTS).then_some(FrameErrors {
+            confidence,
+            turned,
+            ..better
+        }))
+    })?;
+    Ok(measured.figures())
+}
+
+/// Points inside the picture of a camera.
+fn seen(camera: &Camera, points: &[DVec3]) -> Vec<DVec3> {
+    let inside = |point: &&DVec3| camera.project(**point).is_some_and(|pixel| camera.contains(pixel));
+    points.iter().filter(inside).copied().collect()
+}
+
+fn errors(truth: &Camera, found: Option<&Camera>, pitch: &Pitch, seen: &[DVec3]) -> FrameErrors {
+    let lost = FrameErrors { counts: true, iou: Some(0.0), jac5: Some(0.0), ..FrameErrors::default() };
+    let Some(camera) = found else { return lost };
+    let of = |high: bool| {
+        let chosen = seen.iter().copied().filter(move |point| (point.y > 0.0) == high);
+        reprojection_errors_px(camera, chosen.filter_map(|point| Some((point, truth.project(point)?))))
+    };
+    let errors_px = of(false);
+    FrameErrors {
+        counts: true,
+        solved: true,
+        jac5: jac5(&errors_px, 0),
+        errors_px,
+        crossbar_px: of(true),
+        iou: Some(iou_part(truth, camera, pitch)),
+        centre_m: Some(camera.position.distance(truth.position)),
+        focal: Some((camera.focal_px / truth.focal_px - 1.0).abs()),
+        ground_m: ground_errors_m(truth, camera, pitch),
+        ..FrameErrors::default()
+    }
+}
+
+/// How far apart two cameras see the pitch at pixels spread over the picture, metres.
+fn ground_errors_m(truth: &Camera, found: &Camera, pitch: &Pitch) -> Vec<f64> {
+    let (width, height) = (f64::from(truth.width_px), f64::from(truth.height_px));
+    let step = GROUND_STEP * width;
+    let (columns, rows) = ((width / step) as u32, (height / step) as u32);
+    let places = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+    places
+        .filter_map(|(column, row)| {
+            let pixel = DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5) * step;
+            let place = truth.ground_point(pixel)?;
+            let on_pitch = pitch.contains(DVec2::new(place.x, place.z), 0.0);
+            on_pitch.then(|| found.ground_point(pixel).map_or(f64::INFINITY, |other| other.distance(place)))
+        })
+        .collect()
+}
