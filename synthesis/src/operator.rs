@@ -25,6 +25,27 @@ pub struct Tripod {
     pub quickness: f64,
     /// The lens's radial distortion, as in [`Camera`].
     pub k1: f64,
+    /// The other camera, behind the goals.
+    pub behind: BehindGoal,
+}
+
+/// Where the high camera behind a goal stands, and how near to the goal it looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BehindGoal {
+    /// Distance from the goal line, metres.
+    pub beyond_m: f64,
+    /// Height, metres.
+    pub height_m: f64,
+    /// Distance from the pitch's long axis, metres towards the main camera.
+    pub aside_m: f64,
+    /// 0 when it shows the pitch in its depth, 1 when the penalty area before it fills the picture.
+    pub near: f64,
+}
+
+impl Default for BehindGoal {
+    fn default() -> Self {
+        Self { beyond_m: 34.0, height_m: 17.0, aside_m: 0.0, near: 0.0 }
+    }
 }
 
 impl Default for Tripod {
@@ -36,6 +57,7 @@ impl Default for Tripod {
             reaction_s: 0.15,
             quickness: 4.5,
             k1: 0.0,
+            behind: BehindGoal::default(),
         }
     }
 }
@@ -177,11 +199,17 @@ impl Play<'_> {
     #[must_use]
     pub fn high_behind(&self, tripod: &Tripod, end: f64) -> Vec<Camera> {
         let half = self.pitch.length_m / 2.0;
-        let place = DVec3::new(end * (half + 0.55 * tripod.position.z), tripod.position.y, tripod.position.x);
-        let behind = Tripod { position: place, player_share: 0.8 * tripod.player_share, ..*tripod };
-        let aims: Vec<Vec2> =
-            self.aims().iter().map(|aim| Vec2::new(aim.x * 0.7 + end as f32 * 8.0, aim.y * 0.6)).collect();
-        // Zoomed for the middle of the pitch: it has the depth of the whole pitch in view.
+        let BehindGoal { beyond_m, height_m, aside_m, near } = tripod.behind;
+        let place = DVec3::new(end * (half + beyond_m), height_m, aside_m);
+        let share = 0.8 * tripod.player_share * (1.0 + 0.8 * near);
+        let behind = Tripod { position: place, player_share: share, ..*tripod };
+        let aim = |aim: &Vec2| {
+            let deep = Vec2::new(aim.x * 0.7 + end as f32 * 8.0, aim.y * 0.6);
+            let close = Vec2::new((end * (half - 15.0)) as f32 + aim.x * 0.08, aim.y * 0.25);
+            deep.lerp(close, near as f32)
+        };
+        let aims: Vec<Vec2> = self.aims().iter().map(aim).collect();
+        // One zoom for all of it: it has the depth of the pitch in view.
         self.filmed(&behind, &aims, |_| behind.player_share)
     }
 

@@ -14,7 +14,7 @@ use crate::{
     daylight::light,
     grounds::{TEXTS, sides, surroundings, turf},
     nets::NetLook,
-    operator::Tripod,
+    operator::{BehindGoal, Tripod},
     outfit::{Srgb, linear},
     overlay::Style,
     paint::Lights,
@@ -113,7 +113,7 @@ impl Venue {
     pub fn drawn(seed: u64, pitch: Pitch, supporters: [Srgb; 2]) -> Self {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0xD_9A4A);
         let turf = turf(rng);
-        let tripod = platform(rng, &pitch);
+        let tripod = Tripod { behind: behind_goal(seed), ..platform(rng, &pitch) };
         let around = surroundings(rng, &pitch, &tripod, supporters);
         let sky = light(rng);
         let around =
@@ -147,6 +147,18 @@ fn pitch_size(rng: &mut impl Rng) -> Pitch {
     }
 }
 
+/// Cameras behind the goals stand 8 to 45 m behind the line. Half of them look at the depth of the pitch, half at the goal.
+fn behind_goal(seed: u64) -> BehindGoal {
+    let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0xB_E41D);
+    let beyond_m = rng.random_range(10.0..45.0);
+    BehindGoal {
+        beyond_m,
+        height_m: (beyond_m * rng.random_range(0.35..0.8)).clamp(6.0, 30.0),
+        aside_m: rng.random_range(-6.0..6.0),
+        near: if rng.random_bool(0.5) { rng.random_range(0.0..0.4) } else { rng.random_range(0.5..1.0) },
+    }
+}
+
 /// Main cameras stand on the halfway line or some metres beside it, 10–30 m high, 40–90 m from the centre mark.
 fn platform(rng: &mut impl Rng, pitch: &Pitch) -> Tripod {
     let beyond = rng.random_range(14.0..40.0);
@@ -168,6 +180,7 @@ fn platform(rng: &mut impl Rng, pitch: &Pitch) -> Tripod {
         reaction_s: rng.random_range(0.10..0.28),
         quickness: rng.random_range(3.2..5.5),
         k1: if rng.random_bool(0.25) { 0.0 } else { rng.random_range(-0.10..0.06) },
+        behind: BehindGoal::default(),
     }
 }
 

@@ -115,18 +115,20 @@ class Frames:
         pixels, good = camera.project(points(pitch["length_m"], pitch["width_m"]))
         inside = good & (pixels > 0).all(1) & (pixels < camera.size).all(1)
         centre, ends = inside[:7].sum(), inside[7:].sum()
-        if camera.behind or not inside.any():
+        if not inside.any():
             return 1.0
+        if camera.behind:
+            return 3.0
         return 4.0 if ends >= 4 and centre <= 2 else 1.5 if ends >= 4 else 0.6
 
     def _end(self, index):
-        """Where the penalty area in view is, pixels; none when none is."""
+        """Where the penalty area in view is (the near one from behind a goal), pixels; none when none is."""
         camera, pitch = self.cameras[index], self.pitches[index]
         pixels, good = camera.project(points(pitch["length_m"], pitch["width_m"]))
         for first in (7, 25):
             seen = pixels[first : first + 18][good[first : first + 18]]
             seen = seen[(seen > 0).all(1) & (seen < camera.size).all(1)]
-            if len(seen) >= 4 and not camera.behind:
+            if len(seen) >= 4:
                 return seen.mean(0)
         return None
 

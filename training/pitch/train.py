@@ -63,6 +63,20 @@ def loss_of(logits, maps):
 
 
 @torch.no_grad()
+def settle(network, supply, count=24):
+    """Measures the batch statistics of averaged weights anew: their running average is of other weights, and one wild batch spoils it for good."""
+    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
+    for norm in norms:
+        norm.reset_running_stats()
+        norm.momentum = None  # the plain mean over what comes
+    network.train()
+    for _ in range(count):
+        network(next(supply)[0])
+    for norm in norms:
+        norm.momentum = 0.1
+
+
+@torch.no_grad()
 def validate(network, samples):
     """Share of the points found where they are, share of the found points that are right, overlap of the lines."""
     network.eval()
@@ -95,7 +109,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=75.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--rate", type=float, default=3e-3, help="highest learning rate")
-    parser.add_argument("--start", help="checkpoint to go on from")
+    parser.add_argument("--start", help="checkpoint to go on from; with --minutes 0 only its batch statistics are measured")
     arguments = parser.parse_args()
 
     torch.set_num_threads(1)
@@ -122,9 +136,10 @@ def main():
     supply = batches(data, rng)
     while True:
         elapsed = time.time() - began
-        part = elapsed / budget
+        part = elapsed / max(budget, 1e-9)
         if part >= 1.0 or elapsed - reported >= min(240.0, budget / 3):
             reported = elapsed
+            settle(average, supply)
             recall, precision, overlap = validate(average, validation)
             curve.writerow([f"{elapsed:.0f}", seen, f"{running or 0:.4f}", f"{recall:.4f}", f"{precision:.4f}", f"{overlap:.4f}"])
             print(f"{elapsed:.0f} s, {seen} samples, loss {running or 0:.3f}, points found {recall:.3f}, right {precision:.3f}, lines {overlap:.3f}", flush=True)

@@ -4,11 +4,12 @@ use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use synthesis::{
     SynthesisError,
-    dataset::{DepthOptions, FrameOptions, PER_MATCH, Split, broadcast_frames, depth_crops},
+    dataset::{DepthOptions, FrameOptions, PER_MATCH, Split, broadcast_frames, depth_crops, usual_kinds},
+    shots::Shots,
 };
 
 const USAGE: &str = "usage: dataset depth  --out DIR --count N [--seed S] [--split train|validation|test] [--motions FILE] [--shard N] [--height LOW..HIGH]
-       dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--per-match N] [--maps yes|no] [--main-only yes|no]
+       dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--per-match N] [--maps yes|no] [--kinds KIND,KIND,…]
 
 depth writes shard-NNNN/{crops.npy, mask.npy, offset_mm.npy, meta.jsonl}: rendered players for the depth network.
 frames writes images/, labels/ (YOLO: ball, goalkeeper, player, referee), frames.jsonl and maps/: whole pictures.
@@ -73,7 +74,7 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
         split: Split::Train,
         size_px: (1280, 720),
         maps: true,
-        main_only: false,
+        kinds: usual_kinds(),
         per_match: PER_MATCH,
     };
     while let Some(name) = arguments.next() {
@@ -85,7 +86,10 @@ fn frames(mut arguments: impl Iterator<Item = String>) -> Option<FrameOptions> {
             "--split" => options.split = split(&value)?,
             "--maps" => options.maps = yes(&value)?,
             "--per-match" => options.per_match = value.parse().ok()?,
-            "--main-only" => options.main_only = yes(&value)?,
+            // Written like the shots of a clip.
+            "--kinds" => {
+                options.kinds = value.parse::<Shots>().ok()?.0.iter().map(|shot| shot.kind).collect()
+            }
             "--size" => {
                 let (width, height) = value.split_once('x')?;
                 options.size_px = (width.parse().ok()?, height.parse().ok()?);

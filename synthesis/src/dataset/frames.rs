@@ -59,8 +59,15 @@ pub struct FrameOptions {
     pub size_px: (u32, u32),
     /// Whether the maps (people, lines, first and last surfaces) are written too.
     pub maps: bool,
-    /// Whether only main cameras are shown; else one match in eight is seen from high behind a goal, one in close-ups.
-    pub main_only: bool,
+    /// The cameras of one match after the other, over and over; [`usual_kinds`] are six main cameras, one high behind a goal and
+    /// one close-up.
+    pub kinds: Vec<ShotKind>,
+}
+
+/// The cameras of a set for which nothing else is said.
+#[must_use]
+pub fn usual_kinds() -> Vec<ShotKind> {
+    [vec![ShotKind::Main; 6], vec![ShotKind::HighBehind, ShotKind::CloseUp]].concat()
 }
 
 /// One line of `frames.jsonl`.
@@ -125,11 +132,8 @@ fn one_match(
 ) -> Result<Vec<u8>, SynthesisError> {
     let seed = match_seed(options, index);
     let frames = (MATCH_S * f64::from(FRAME_RATE)) as usize;
-    let kind = match index % 8 {
-        6 if !options.main_only => ShotKind::HighBehind,
-        7 if !options.main_only => ShotKind::CloseUp,
-        _ => ShotKind::Main,
-    };
+    let kinds = options.kinds.len().max(1);
+    let kind = options.kinds.get(index % kinds).copied().unwrap_or(ShotKind::Main);
     let mut fixture = Fixture::new(
         &Trajectories::generated(seed, MATCH_S + 1.0),
         &FixtureOptions {
@@ -245,7 +249,7 @@ mod tests {
                 split,
                 size_px: (320, 180),
                 maps: true,
-                main_only: false,
+                kinds: usual_kinds(),
             };
             broadcast_frames(&options, |_| ()).unwrap();
             let read = |file: &str| std::fs::read(options.out.join(file)).unwrap();

@@ -21,7 +21,7 @@ mod frames;
 mod sample;
 
 use cast::Cast;
-pub use frames::{FrameOptions, PER_MATCH, broadcast_frames};
+pub use frames::{FrameOptions, PER_MATCH, broadcast_frames, usual_kinds};
 pub use sample::{Sample, SampleMeta, aim, plane_depth};
 
 /// Side of a crop and of its mask, pixels.

@@ -90,6 +90,7 @@ pub(super) fn pictures(
         let sum = |frame: &FrameErrors| frame.errors_px.iter().sum::<f64>();
         let turned = sum(&half_turned) < sum(&straight);
         let better = if turned { half_turned } else { straight };
+        tracing::info!(picture = truth.name, ?confidence, errors_px = ?better.errors_px, "measured");
         Ok((seen(&truth.camera, &points).len() >= LEAST_POINTS).then_some(FrameErrors {
             confidence,
             turned,
