@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use super::{
-    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS,
+    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS, by_guess,
     figures::{FrameErrors, jac5, reprojection_errors_px, summary, turned},
     locate_each, open_picture, parse, pitch_points, read,
 };
@@ -56,16 +56,20 @@ pub(super) fn evaluate(
     let pitch = Pitch::default();
     let measured = locate_each(&labels, options, progress, |label, finder| {
         let (picture, points) = annotated(data, label, &names)?;
-        let (camera, confidence) = finder.find(&picture, &pitch)?;
-        let errors = located_errors(camera.as_ref(), &points);
-        tracing::info!(label = %label.display(), ?camera, ?confidence, ?errors, "found");
-        Ok(errors.map(|errors| FrameErrors { confidence, ..errors }))
+        let flat = points.iter().filter(|point| point.world_m.y == 0.0).count();
+        if (PITCH_POINTS..LEAST_POINTS).contains(&flat) {
+            return Ok(None);
+        }
+        let guess = finder.find(&picture, &pitch)?;
+        let frame = by_guess(guess.as_ref(), |camera| located_errors(camera, &points));
+        tracing::info!(label = %label.display(), ?guess, ?frame, "measured");
+        Ok(Some(frame))
     })?;
     Ok(measured.figures())
 }
 
-/// Errors of a camera that was found without the annotated points; `None` for frames that neither count nor show no pitch.
-fn located_errors(camera: Option<&Camera>, points: &[Correspondence]) -> Option<FrameErrors> {
+/// Errors of a camera that was found without the annotated points.
+fn located_errors(camera: Option<&Camera>, points: &[Correspondence]) -> FrameErrors {
     let (flat, high): (Vec<&Correspondence>, Vec<&Correspondence>) =
         points.iter().partition(|point| point.world_m.y == 0.0);
     let errors = |camera: &Camera, points: &[&Correspondence]| {
@@ -82,16 +86,11 @@ fn located_errors(camera: Option<&Camera>, points: &[Correspondence]) -> Option<
             let all: Vec<&Correspondence> = points.iter().collect();
             all.is_empty() || errors(camera, &all).iter().any(|&error| error > FALSE_PX)
         };
-        return Some(FrameErrors {
-            false_camera: Some(better.as_ref().is_some_and(wrong)),
-            ..FrameErrors::default()
-        });
-    }
-    if flat.len() < LEAST_POINTS {
-        return None;
+        let false_camera = Some(better.as_ref().is_some_and(wrong));
+        return FrameErrors { false_camera, ..FrameErrors::default() };
     }
     let Some((camera, turned)) = better else {
-        return Some(FrameErrors { counts: true, jac5: Some(0.0), ..FrameErrors::default() });
+        return FrameErrors { counts: true, jac5: Some(0.0), ..FrameErrors::default() };
     };
     let errors_px = errors(&camera, &flat);
     let annotated = |world: &DVec3| points.iter().any(|point| point.world_m.distance(*world) < 0.1);
@@ -100,7 +99,7 @@ fn located_errors(camera: Option<&Camera>, points: &[Correspondence]) -> Option<
         .filter(|world| world.y == 0.0 && !annotated(world))
         .filter(|world| camera.project(**world).is_some_and(|pixel| camera.contains(pixel)))
         .count();
-    Some(FrameErrors {
+    FrameErrors {
         counts: true,
         solved: true,
         turned,
@@ -108,7 +107,7 @@ fn located_errors(camera: Option<&Camera>, points: &[Correspondence]) -> Option<
         errors_px,
         crossbar_px: errors(&camera, &high),
         ..FrameErrors::default()
-    })
+    }
 }
 
 /// A picture with the camera that its annotated points and its lines give.

@@ -85,6 +85,18 @@ pub(super) struct FrameErrors {
     pub(super) ground_m: Vec<f64>,
     pub(super) line_residual_px: Option<f64>,
     pub(super) confidence: Option<f64>,
+    /// Whether the best guess was right, sure or not.
+    pub(super) right: Option<bool>,
+}
+
+impl FrameErrors {
+    /// Nine of ten points within a hundredth of the width, and no camera where there is no pitch.
+    pub(super) fn is_right(&self) -> bool {
+        let mut errors = self.errors_px.clone();
+        errors.sort_by(f64::total_cmp);
+        let high = errors.get((0.9 * errors.len() as f64) as usize);
+        self.false_camera != Some(true) && high.is_some_and(|&error| error <= 0.01 * STATED_WIDTH_PX)
+    }
 }
 
 pub(super) fn summary(frames: &[FrameErrors]) -> CalibrationFigures {
@@ -127,19 +139,13 @@ pub(super) fn summary(frames: &[FrameErrors]) -> CalibrationFigures {
     }
 }
 
-/// Frames by confidence, and how many of each were right: nine of ten points within a hundredth of the width.
+/// Frames by confidence, and how many of each were right.
 fn reliability(frames: &[FrameErrors]) -> Vec<(f64, f64, usize, usize)> {
     let limits = [0.0, 0.25, 0.5, 0.7, 0.85, 0.95, 1.001];
-    let right = |frame: &FrameErrors| {
-        let mut errors = frame.errors_px.clone();
-        errors.sort_by(f64::total_cmp);
-        let high = errors.get((0.9 * errors.len() as f64) as usize);
-        frame.false_camera != Some(true) && high.is_some_and(|&error| error <= 0.01 * STATED_WIDTH_PX)
-    };
     let band = |low: f64, high: f64| {
         let inside = |frame: &&FrameErrors| frame.confidence.is_some_and(|c| (low..high).contains(&c));
-        let chosen: Vec<&FrameErrors> = frames.iter().filter(inside).collect();
-        (low, high, chosen.len(), chosen.iter().filter(|frame| right(frame)).count())
+        let chosen: Vec<bool> = frames.iter().filter(inside).filter_map(|frame| frame.right).collect();
+        (low, high, chosen.len(), chosen.iter().filter(|right| **right).count())
     };
     limits
         .windows(2)
@@ -250,10 +256,17 @@ mod tests {
             solved: true,
             errors_px: vec![1.0, 2.0, 3.0],
             confidence: Some(0.9),
+            right: Some(true),
             ..FrameErrors::default()
         };
+        assert!(good.is_right());
         let lost = FrameErrors { counts: true, ..FrameErrors::default() };
-        let empty = FrameErrors { false_camera: Some(true), confidence: Some(0.9), ..FrameErrors::default() };
+        let empty = FrameErrors {
+            false_camera: Some(true),
+            confidence: Some(0.9),
+            right: Some(false),
+            ..FrameErrors::default()
+        };
         let figures = summary(&[good, lost, empty]);
         assert_eq!((figures.frames, figures.solved, figures.completeness), (2, 1, 0.5));
         assert_eq!((figures.frames_without_pitch, figures.false_camera_rate), (1, Some(1.0)));

@@ -9,7 +9,7 @@ use protocol::pitch::Pitch;
 use serde::Deserialize;
 
 use super::{
-    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions,
+    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, by_guess,
     figures::{FrameErrors, overlap},
     locate_each, open_picture, parse,
 };
@@ -41,23 +41,22 @@ pub(super) fn evaluate(
     let pitch = Pitch { length_m: size.x, width_m: size.y };
     let measured = locate_each(&pictures, options, progress, |(path, annotation), finder| {
         let picture = stretched(open_picture(path)?);
-        let (camera, confidence) = finder.find(&picture, &pitch)?;
+        let guess = finder.find(&picture, &pitch)?;
         let homography = DMat3::from_cols_array_2d(&annotation.h_pitch_yards_to_1280x720).transpose();
-        let iou = camera.map(|camera| {
-            let shown = |place: DVec2| {
-                let point = DVec3::new(place.x, 0.0, place.y);
-                camera.project(point).is_some_and(|pixel| camera.contains(pixel))
-            };
-            overlap(&pitch, |place| in_view(&homography, place, &pitch), shown)
+        let frame = by_guess(guess.as_ref(), |camera| {
+            let iou = camera.map(|camera| {
+                let shown = |place: DVec2| {
+                    let point = DVec3::new(place.x, 0.0, place.y);
+                    camera.project(point).is_some_and(|pixel| camera.contains(pixel))
+                };
+                overlap(&pitch, |place| in_view(&homography, place, &pitch), shown)
+            });
+            let iou = Some(iou.unwrap_or(0.0));
+            FrameErrors { counts: true, solved: camera.is_some(), iou, ..FrameErrors::default() }
         });
-        tracing::info!(picture = %path.display(), ?iou, ?confidence, "overlap");
-        Ok(Some(FrameErrors {
-            counts: true,
-            solved: camera.is_some(),
-            iou: Some(iou.unwrap_or(0.0)),
-            confidence,
-            ..FrameErrors::default()
-        }))
+        tracing::info!(picture = %path.display(), ?guess, iou = ?frame.iou, "measured");
+        // No points: right cannot be told apart from nearly right.
+        Ok(Some(FrameErrors { right: None, ..frame }))
     })?;
     Ok(measured.figures())
 }

@@ -186,18 +186,23 @@ struct Finder {
 }
 
 impl Finder {
-    /// The camera if the stage is sure enough of it, and its confidence if it has any guess.
-    fn find(
-        &mut self,
-        picture: &RgbImage,
-        pitch: &Pitch,
-    ) -> Result<(Option<Camera>, Option<f64>), InferenceError> {
+    /// The stage's best guess, however unsure; `None` when it has none.
+    fn find(&mut self, picture: &RgbImage, pitch: &Pitch) -> Result<Option<Located>, InferenceError> {
         let started = crate::report::thread_cpu_s();
-        let guess: Option<Located> = self.locator.guess(picture, &[], pitch)?.ok();
+        let guess = self.locator.guess(picture, &[], pitch)?.ok();
         self.cpu_s += crate::report::thread_cpu_s() - started;
-        let camera = guess.filter(Located::is_sure).map(|located| located.camera);
-        Ok((camera, guess.map(|located| located.confidence)))
+        Ok(guess)
     }
+}
+
+/// Errors of a frame by its guess: `of` measures a camera, or none. Unsure guesses count as none, but it is kept whether
+/// they were right.
+fn by_guess(guess: Option<&Located>, of: impl Fn(Option<&Camera>) -> FrameErrors) -> FrameErrors {
+    let Some(located) = guess else { return of(None) };
+    let guessed = of(Some(&located.camera));
+    let right = Some(guessed.is_right());
+    let frame = if located.is_sure() { guessed } else { of(None) };
+    FrameErrors { confidence: Some(located.confidence), right, ..frame }
 }
 
 fn open_picture(path: &Path) -> Result<RgbImage, CalibrationEvaluationError> {

@@ -7,7 +7,7 @@ use protocol::{camera::Camera, pitch::Pitch};
 use serde::Deserialize;
 
 use super::{
-    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS,
+    CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS, by_guess,
     figures::{FrameErrors, iou_part, jac5, reprojection_errors_px, summary, turned},
     locate_each, open_picture, parse, parse_lines, pitch_points,
 };
@@ -77,25 +77,23 @@ pub(super) fn pictures(
     let truths: Vec<PictureTruth> = parse_lines(&data.join("frames.jsonl"))?;
     let measured = locate_each(&truths, options, progress, |truth, finder| {
         let picture = open_picture(&data.join("images").join(&truth.name).with_extension("jpg"))?;
-        let (camera, confidence) = finder.find(&picture, &truth.pitch)?;
-        if truth.shot.kind == "close-up" {
-            let false_camera = Some(camera.is_some());
-            return Ok(Some(FrameErrors { false_camera, confidence, ..FrameErrors::default() }));
-        }
+        let guess = finder.find(&picture, &truth.pitch)?;
         let points = pitch_points(&truth.pitch);
-        let of = |true_camera: &Camera| {
-            errors(true_camera, camera.as_ref(), &truth.pitch, &seen(true_camera, &points))
-        };
-        let (straight, half_turned) = (of(&truth.camera), of(&turned(&truth.camera)));
-        let sum = |frame: &FrameErrors| frame.errors_px.iter().sum::<f64>();
-        let turned = sum(&half_turned) < sum(&straight);
-        let better = if turned { half_turned } else { straight };
-        tracing::info!(picture = truth.name, ?confidence, errors_px = ?better.errors_px, "measured");
-        Ok((seen(&truth.camera, &points).len() >= LEAST_POINTS).then_some(FrameErrors {
-            confidence,
-            turned,
-            ..better
-        }))
+        let close_up = truth.shot.kind == "close-up";
+        let frame = by_guess(guess.as_ref(), |camera| {
+            if close_up {
+                return FrameErrors { false_camera: Some(camera.is_some()), ..FrameErrors::default() };
+            }
+            let of = |truth_camera: &Camera| {
+                errors(truth_camera, camera, &truth.pitch, &seen(truth_camera, &points))
+            };
+            let (straight, half_turned) = (of(&truth.camera), of(&turned(&truth.camera)));
+            let sum = |frame: &FrameErrors| frame.errors_px.iter().sum::<f64>();
+            let turned = sum(&half_turned) < sum(&straight);
+            FrameErrors { turned, ..if turned { half_turned } else { straight } }
+        });
+        tracing::info!(picture = truth.name, right = ?frame.right, confidence = ?frame.confidence, "measured");
+        Ok((close_up || seen(&truth.camera, &points).len() >= LEAST_POINTS).then_some(frame))
     })?;
     Ok(measured.figures())
 }
