@@ -57,7 +57,21 @@ pub(super) struct Evidence {
     pub(super) pitch_share: f64,
     /// For every kind of line the cells that may show it.
     pub(super) shown: Vec<bool>,
-    /// How the picture lies in the network's input.
+    impl Evidence {
+    /// Lets every cell that may show the line `from` also show the line `to`.
+    pub(super) fn also_shown(&mut self, from: usize, to: usize) {
+        let plane = ROWS * COLUMNS;
+        for cell in 0..plane {
+            if self.shown.get(from * plane + cell) == Some(&true)
+                && let Some(place) = self.shown.get_mut(to * plane + cell)
+            {
+                *place = true;
+            }
+        }
+    }
+}
+
+/// How the picture lies in the network's input.
     pub(super) fitted: Fitted,
 }
 

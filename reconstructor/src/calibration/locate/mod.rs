@@ -10,6 +10,7 @@ mod crossings;
 mod evidence;
 mod hypotheses;
 mod names;
+mod readings;
 mod refine;
 #[cfg(test)]
 mod tests;
@@ -31,6 +32,7 @@ use crate::{
 use confidence::Agreement;
 use evidence::Evidence;
 use hypotheses::Pair;
+use readings::{End, before_goal};
 pub(crate) use refine::Terms;
 use refine::{Named, refine};
 
@@ -41,6 +43,8 @@ pub(crate) const MODEL: &str = "pitch.onnx";
 const PAIRS_MIN: usize = 3;
 /// A camera below this confidence is no camera.
 pub(crate) const CONFIDENCE_MIN: f64 = 0.5;
+/// From this confidence on, other readings of the names are not tried.
+const CLEAR: f64 = 0.9;
 /// The painted lines may move the network's camera by this much: standard deviations of log focal length, rotation (radians),
 /// position (m) and k1.
 const POLISH_SIGMA: [f64; 8] = [0.04, 0.010, 0.010, 0.006, 2.0, 2.0, 2.0, 0.03];
@@ -88,30 +92,8 @@ impl Locator {
         self.network_s
     }
 
-    /// The camera of a picture of a pitch of known size; `people` hide lines. `Err` in the inner result says in plain words why
-    /// there is none.
-    ///
-    /// # Errors
-    /// When the network fails.
-    pub(crate) fn locate(
-        &mut self,
-        picture: &RgbImage,
-        people: &[PixelBox],
-        pitch: &Pitch,
-    ) -> Result<Result<Located, String>, InferenceError> {
-        let guess = self.guess(picture, people, pitch)?;
-        Ok(guess.and_then(|located| {
-            let unsure = || {
-                format!(
-                    "no pitch camera here: the best guess is right with probability {:.2}",
-                    located.confidence
-                )
-            };
-            located.is_sure().then_some(located).ok_or_else(unsure)
-        }))
-    }
-
-    /// As [`locate`](Self::locate), however unsure.
+    /// The best guess of the camera of a picture of a pitch of known size, however unsure; `people` hide lines. `Err` in the inner
+    /// result says in plain words why there is none.
     ///
     /// # Errors
     /// When the network fails.
@@ -125,14 +107,35 @@ impl Locator {
         let evidence = evidence::find(&mut self.model, picture)?;
         self.network_s += thread_cpu_s() - started;
         let named = Named::new(pitch);
-        Ok(explain(&evidence, &named, pitch, self.terms).map(|(mut camera, _)| {
-            if self.terms.polish {
-                camera = polish(&camera, picture, people, pitch, self.terms);
+        let mut best = self.read(&evidence, &named, pitch);
+        // Names that fit together are not doubted.
+        if !best.as_ref().is_ok_and(|located| located.confidence >= CLEAR) {
+            for end in [End::Left, End::Right] {
+                let other = self.read(&before_goal(&evidence, end), &named, pitch);
+                let confidence = |guess: &Result<Located, String>| guess.as_ref().map_or(0.0, |g| g.confidence);
+                if confidence(&other) > confidence(&best) {
+                    best = other;
+                }
             }
-            let agreement = Agreement::of(&camera, &evidence, &named);
-            tracing::debug!(?agreement, "camera from named points and lines");
-            Located { camera, confidence: agreement.confidence() }
+        }
+        Ok(best.map(|located| {
+            let camera = if self.terms.polish {
+                polish(&located.camera, picture, people, pitch, self.terms)
+            } else {
+                located.camera
+            };
+            Located { camera, ..located }
         }))
+    }
+}
+
+impl Locator {
+    /// The best camera for one reading of the evidence.
+    fn read(&self, evidence: &Evidence, named: &Named, pitch: &Pitch) -> Result<Located, String> {
+        let (camera, _) = explain(evidence, named, pitch, self.terms)?;
+        let agreement = Agreement::of(&camera, evidence, named);
+        tracing::debug!(?agreement, "camera from named points and lines");
+        Ok(Located { camera, confidence: agreement.confidence() })
     }
 }
 
