@@ -204,7 +204,7 @@ impl Map<'_> {
             for x in 0..COLUMNS {
                 let value = self.at(x, y);
                 // NaN fails this comparison too.
-                if !(value >= LINE_MIN) {
+                if value.is_nan() || value < LINE_MIN {
                     continue;
                 }
                 let (left, right) = (if x > 0 { self.at(x - 1, y) } else { 0.0 }, self.at(x + 1, y));

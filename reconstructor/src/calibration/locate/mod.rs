@@ -88,30 +88,8 @@ impl Locator {
         self.network_s
     }
 
-    /// The camera of a picture of a pitch of known size; `people` hide lines. `Err` in the inner result says in plain words why
-    /// there is none.
-    ///
-    /// # Errors
-    /// When the network fails.
-    pub(crate) fn locate(
-        &mut self,
-        picture: &RgbImage,
-        people: &[PixelBox],
-        pitch: &Pitch,
-    ) -> Result<Result<Located, String>, InferenceError> {
-        let guess = self.guess(picture, people, pitch)?;
-        Ok(guess.and_then(|located| {
-            let unsure = || {
-                format!(
-                    "no pitch camera here: the best guess is right with probability {:.2}",
-                    located.confidence
-                )
-            };
-            located.is_sure().then_some(located).ok_or_else(unsure)
-        }))
-    }
-
-    /// As [`locate`](Self::locate), however unsure.
+    /// The camera of a picture of a pitch of known size, however unsure; `people` hide lines. `Err` in the inner result says in
+    /// plain words why there is none.
     ///
     /// # Errors
     /// When the network fails.
