@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use protocol::{
     chunk::{Chunk, FrameQuality},
-    manifest::Manifest,
+    manifest::{Manifest, Segment},
     playback::{FailureKind, Playback, PlaybackConfig, PlaybackState, Request, ShownFrame, Speed},
     time::Ticks,
 };
@@ -98,6 +98,12 @@ impl Session {
     #[must_use]
     pub fn manifest(&self) -> Option<&Manifest> {
         self.manifest.as_ref()
+    }
+
+    /// The shots and gaps of the match, as far as the stream tells them.
+    #[must_use]
+    pub fn segments(&self) -> &[Segment] {
+        self.manifest.as_ref().map_or(&[], |manifest| &manifest.segments)
     }
 
     /// The timeline, once the first chunk was read.

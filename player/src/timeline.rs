@@ -1,6 +1,7 @@
 //! Arithmetic of the timeline: frames, moments and their labels. No clock and no widgets in here.
 
 use protocol::{
+    manifest::{Segment, SegmentKind},
     playback::Speed,
     time::{Ticks, Timescale},
 };
@@ -53,6 +54,35 @@ impl Timeline {
     }
 }
 
+/// A segment as it lies on the timeline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark {
+    /// Where it begins, 0 at the first frame and 1 at the last one.
+    pub start: f32,
+    /// Where it ends, likewise.
+    pub end: f32,
+    /// Whether nothing is shown in it.
+    pub is_gap: bool,
+}
+
+impl Timeline {
+    /// Where segments lie; those that the timeline does not reach are left out.
+    #[must_use]
+    pub fn marks(&self, segments: &[Segment]) -> Vec<Mark> {
+        let last = f64::from((self.frames() - 1).max(1));
+        let share = |moment: Ticks| (f64::from(self.frame_at(moment)) / last) as f32;
+        let end = self.start + self.duration;
+        let reached = segments.iter().filter(|s| s.start < end && s.start + s.duration > self.start);
+        reached
+            .map(|segment| Mark {
+                start: share(segment.start),
+                end: share(segment.start + segment.duration),
+                is_gap: segment.kind == SegmentKind::Gap,
+            })
+            .collect()
+    }
+}
+
 /// A speed as the menu shows it: `0.25×`.
 #[must_use]
 pub fn speed_label(speed: Speed) -> String {
@@ -94,6 +124,25 @@ mod tests {
         assert_eq!(timeline.label(Ticks(29_999)), "0:00.99");
         assert_eq!(timeline.label(Ticks(30_000 * 61 + 3_000)), "1:01.10");
         assert_eq!(Timeline { start: Ticks(30_000), ..timeline }.label(Ticks(60_000)), "0:01.00");
+    }
+
+    #[test]
+    fn segments_lie_where_their_frames_are() {
+        let timeline = Timeline { start: Ticks(10_010), ..ntsc(101) };
+        let segment = |from: i64, frames: i64, kind| Segment {
+            start: Ticks(10_010 + 1001 * from),
+            duration: Ticks(1001 * frames),
+            kind,
+        };
+        let marks = timeline.marks(&[
+            segment(-10, 10, SegmentKind::Gap),
+            segment(0, 50, SegmentKind::Shot),
+            segment(50, 25, SegmentKind::Gap),
+            segment(75, 26, SegmentKind::Shot),
+            segment(300, 5, SegmentKind::Shot),
+        ]);
+        let places: Vec<(f32, f32, bool)> = marks.iter().map(|m| (m.start, m.end, m.is_gap)).collect();
+        assert_eq!(places, [(0.0, 0.5, false), (0.5, 0.75, true), (0.75, 1.0, false)]);
     }
 
     #[test]

@@ -97,6 +97,9 @@ pub struct Manifest {
     pub static_scene: Option<FileEntry>,
     /// Everybody who appears.
     pub people: Vec<Person>,
+    /// The shots of the broadcast and the gaps between them, in order of time; empty when nothing is known of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub segments: Vec<Segment>,
     /// The quality ladder, best last.
     pub representations: Vec<Representation>,
 }
@@ -203,6 +206,30 @@ pub struct Person {
     pub number: Option<u8>,
     /// Main colour of the shirt, sRGB.
     pub shirt_rgb: Option<[u8; 3]>,
+}
+
+/// A stretch of the match that one camera showed, or that no camera showed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Segment {
+    /// When it begins.
+    pub start: Ticks,
+    /// How long it lasts.
+    pub duration: Ticks,
+    /// What it is.
+    pub kind: SegmentKind,
+}
+
+/// What a segment is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SegmentKind {
+    /// One shot of a camera that saw the pitch. People have other identities than in other shots.
+    Shot,
+    /// The broadcast showed something else: a close-up, a replay, a dissolve. There are no frames.
+    Gap,
+    /// Of a kind that this reader does not know.
+    #[serde(other)]
+    Other,
 }
 
 /// One quality of the whole match.

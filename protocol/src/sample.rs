@@ -63,6 +63,7 @@ pub fn match_of(frames: u32, people: u32) -> Result<SampleMatch, ChunkError> {
         pitch: Pitch::default(),
         static_scene: None,
         people: (0..people).map(person).collect(),
+        segments: Vec::new(),
         representations: vec![Representation { id: "high".to_owned(), triangles_per_body: 72, chunks }],
     };
     Ok(SampleMatch { manifest, files })

@@ -3,6 +3,7 @@
 use std::{net::SocketAddr, ops::Range, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use protocol::pitch::Pitch;
 
 /// Turns a broadcast football clip into a match that stands on a table.
 #[derive(Debug, Parser)]
@@ -16,12 +17,12 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Reconstruct a clip into a stream that players show.
     #[command(
-        after_help = "Example:\n  reconstructor reconstruct clip.mp4 --frames 150..450 --calibration points.json --out stream --work work --report report.json"
+        after_help = "Example:\n  reconstructor reconstruct clip.mp4 --frames 150..450 --out stream --work work --report report.json"
     )]
     Reconstruct(Reconstruct),
     /// Find the camera of every frame of a clip, or of pictures of one shot.
     #[command(
-        after_help = "Example:\n  reconstructor calibrate clip.mp4 --calibration points.json --out cameras.json --overlay overlays"
+        after_help = "Examples:\n  reconstructor calibrate clip.mp4 --out cameras.json --overlay overlay.mp4\n  reconstructor calibrate clip.mp4 --pitch 100x64 --calibration points.json --out cameras.json"
     )]
     Calibrate(Calibrate),
     /// Render a broadcast clip of a match together with its ground truth.
@@ -44,9 +45,13 @@ pub(crate) struct Reconstruct {
     /// Folder for the stream; an older stream in it is replaced.
     #[arg(long, value_name = "STREAM")]
     pub(crate) out: PathBuf,
-    /// Four or more points of the pitch seen in one frame of the range. This version cannot do without.
-    #[arg(long, value_name = "POINTS.json")]
+    /// Points of the pitch in one frame, or cameras (SoccerNet's JSON or what `calibrate` wrote): they win for their shots, all
+    /// others are found without.
+    #[arg(long, value_name = "FILE.json")]
     pub(crate) calibration: Option<PathBuf>,
+    /// Length and width of the pitch in metres; 105x68 when neither this nor the calibration says.
+    #[arg(long, value_name = "LxW", value_parser = pitch)]
+    pub(crate) pitch: Option<Pitch>,
     /// Frames of the clip, from A up to but without B; all when not given.
     #[arg(long, value_name = "A..B", value_parser = frame_range)]
     pub(crate) frames: Option<Range<u32>>,
@@ -69,17 +74,21 @@ pub(crate) struct Calibrate {
     /// One clip, or pictures of one shot in order.
     #[arg(required = true, value_name = "CLIP|IMAGE")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// Four or more points of the pitch seen in one frame.
-    #[arg(long, value_name = "POINTS.json")]
-    pub(crate) calibration: PathBuf,
+    /// Points of the pitch in one frame, or cameras (SoccerNet's JSON or what this command wrote): they win for their shots,
+    /// all others are found without.
+    #[arg(long, value_name = "FILE.json")]
+    pub(crate) calibration: Option<PathBuf>,
+    /// Length and width of the pitch in metres; 105x68 when neither this nor the calibration says.
+    #[arg(long, value_name = "LxW", value_parser = pitch)]
+    pub(crate) pitch: Option<Pitch>,
     /// Where the cameras go.
     #[arg(long, value_name = "CAMERAS.json")]
     pub(crate) out: PathBuf,
     /// Frames of the clip, from A up to but without B; all when not given.
     #[arg(long, value_name = "A..B", value_parser = frame_range)]
     pub(crate) frames: Option<Range<u32>>,
-    /// Folder for pictures with the pitch lines drawn in.
-    #[arg(long, value_name = "DIR")]
+    /// Folder for pictures with the pitch lines drawn in, or an .mp4 file for a video of them (needs ffmpeg).
+    #[arg(long, value_name = "DIR|FILE.mp4")]
     pub(crate) overlay: Option<PathBuf>,
 }
 
@@ -240,6 +249,18 @@ fn frame_range(text: &str) -> Result<Range<u32>, String> {
     }
 }
 
+/// `LxW` as a pitch in metres.
+fn pitch(text: &str) -> Result<Pitch, String> {
+    let wrong = || format!("`{text}` is no pitch; write length and width in metres as 105x68");
+    let (length, width) = text.split_once('x').ok_or_else(wrong)?;
+    let pitch = Pitch {
+        length_m: length.trim().parse().map_err(|_| wrong())?,
+        width_m: width.trim().parse().map_err(|_| wrong())?,
+    };
+    let possible = (40.0..=150.0).contains(&pitch.length_m) && (30.0..=110.0).contains(&pitch.width_m);
+    possible.then_some(pitch).ok_or_else(|| format!("`{text}`: length is 40 to 150 m, width 30 to 110 m"))
+}
+
 /// `WxH` as a size in pixels.
 fn size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || format!("`{text}` is not a size; write it as 1280x720");
@@ -272,6 +293,14 @@ mod tests {
         assert_eq!(size("1280x720"), Ok((1280, 720)));
         for wrong in ["", "1280", "1280x", "x720", "-1x5", "a×b"] {
             assert!(size(wrong).unwrap_err().contains("1280x720"));
+        }
+    }
+
+    #[test]
+    fn pitches_are_read_and_bad_ones_explained() {
+        assert_eq!(pitch("100.5x64"), Ok(Pitch { length_m: 100.5, width_m: 64.0 }));
+        for wrong in ["", "105", "105x", "-105x68", "10x68", "105x999", "NaNx68"] {
+            assert!(pitch(wrong).unwrap_err().contains(wrong), "{wrong}");
         }
     }
 

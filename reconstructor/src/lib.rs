@@ -1,6 +1,6 @@
 //! Clip to stream: the pipeline of "Soccer on Your Tabletop" (Rematas et al., CVPR 2018), one module per section.
 //!
-//! `ingest → detection → calibration → pose → tracking → segmentation → depth → mesh → trajectory → encode`.
+//! `ingest → shots → detection → calibration → pose → tracking → segmentation → depth → mesh → trajectory → encode`.
 //! A stage is one entry function with typed input and output; no stage imports a later one.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
@@ -19,5 +19,6 @@ pub mod pose;
 pub mod report;
 pub mod segmentation;
 pub mod serve;
+pub mod shots;
 pub mod tracking;
 pub mod trajectory;

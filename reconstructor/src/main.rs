@@ -10,11 +10,14 @@ use std::{
     process::ExitCode,
 };
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Parser;
 use protocol::limits::Limits;
 use reconstructor::{
-    calibration::command::{self, CalibrateOptions},
+    calibration::{
+        ShotFigures,
+        command::{self, CalibrateOptions},
+    },
     encode::read_stream,
     evaluate::{self, depth, matches},
     mesh::MeshBudget,
@@ -79,17 +82,12 @@ fn run(command: Command) -> Result<()> {
 }
 
 fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
-    let Some(calibration) = arguments.calibration else {
-        bail!(
-            "{}: this version needs --calibration POINTS.json, four or more pitch points of one frame; see `reconstructor calibrate --help`",
-            arguments.clip.display()
-        );
-    };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let options = ReconstructOptions {
         clip: arguments.clip,
         out: arguments.out,
-        calibration,
+        calibration: arguments.calibration,
+        pitch: arguments.pitch,
         frames: arguments.frames,
         work: arguments.work,
         budget: MeshBudget { triangles: arguments.triangles as usize },
@@ -123,6 +121,7 @@ fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
     let options = CalibrateOptions {
         inputs: arguments.inputs,
         calibration: arguments.calibration,
+        pitch: arguments.pitch,
         frames: arguments.frames,
         out: arguments.out,
         overlay: arguments.overlay,
@@ -130,6 +129,9 @@ fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
     let progress = Progress::new("calibration", 0);
     let report = command::run(&options, &progress)?;
     drop(progress);
+    for shot in &report.shots {
+        println!("{}", shot_line(shot));
+    }
     println!(
         "{}: {} of {} cameras, {} median line residual, {} worst frame",
         options.out.display(),
@@ -139,6 +141,26 @@ fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
         pixels(report.line_residual_worst_px),
     );
     Ok(())
+}
+
+/// A shot's cameras for people to read.
+fn shot_line(shot: &ShotFigures) -> String {
+    let metres = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.2} m"));
+    format!(
+        "frames {}..{} of the range: {} cameras, found alone in {} of {} frames and {} of these agree; {} ({} frame by frame) \
+         median line residual; place known to {} (halves of the shot), {} frame by frame{}",
+        shot.frames.start,
+        shot.frames.end,
+        shot.solved,
+        shot.located,
+        shot.tried,
+        shot.agreeing,
+        pixels(shot.line_residual_median_px),
+        pixels(shot.free_line_residual_median_px),
+        metres(shot.halves_apart_m),
+        metres(shot.free_centre_std_m),
+        if shot.moving { "; the camera moves" } else { "" },
+    )
 }
 
 fn run_synthesize(arguments: cli::Synthesize) -> Result<()> {

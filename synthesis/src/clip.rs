@@ -174,7 +174,7 @@ pub fn synthesize(options: &Options, progress: impl Fn(usize) + Sync) -> Result<
 
     let clip = options.out.join("clip.mp4");
     let rate = options.crf.map_or(fixture.chain.rate, Rate::Quality);
-    let mut video = Video::start(&clip, options.size_px, FRAME_RATE, rate)?;
+    let mut video = Video::start(&clip, options.size_px, (FRAME_RATE, 1), rate)?;
     let mut writer = TruthWriter::create(
         &options.out,
         TruthOptions {

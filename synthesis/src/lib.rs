@@ -60,7 +60,7 @@ pub mod trajectories;
 pub mod truth;
 pub mod turf;
 pub mod venue;
-mod video;
+pub mod video;
 pub mod view;
 pub mod wardrobe;
 

@@ -8,19 +8,24 @@ use std::{
 
 use image::RgbImage;
 
-use crate::{SynthesisError, chain::Rate};
+use crate::SynthesisError;
+pub use crate::chain::Rate;
 
 /// An H.264 file being written.
-pub(crate) struct Video {
+pub struct Video {
     path: PathBuf,
     process: Child,
 }
 
 impl Video {
-    pub(crate) fn start(
+    /// Begins a file for pictures of one size, at a number of frames per second (a fraction).
+    ///
+    /// # Errors
+    /// When the `ffmpeg` program cannot be started.
+    pub fn start(
         path: &Path,
         (width, height): (u32, u32),
-        frame_rate: u32,
+        (frames, seconds): (u32, u32),
         rate: Rate,
     ) -> Result<Self, SynthesisError> {
         let budget: Vec<String> = match rate {
@@ -38,7 +43,7 @@ impl Video {
         };
         let process = Command::new("ffmpeg")
             .args(["-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"])
-            .args(["-s", &format!("{width}x{height}"), "-r", &frame_rate.to_string(), "-i", "-"])
+            .args(["-s", &format!("{width}x{height}"), "-r", &format!("{frames}/{seconds}"), "-i", "-"])
             .args(["-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"])
             .args(["-c:v", "libx264", "-threads", "1"])
             .args(budget)
@@ -62,13 +67,21 @@ impl Video {
         Ok(Self { path: path.to_owned(), process })
     }
 
-    pub(crate) fn push(&mut self, picture: &RgbImage) -> Result<(), SynthesisError> {
+    /// Adds the next picture.
+    ///
+    /// # Errors
+    /// When `ffmpeg` has stopped.
+    pub fn push(&mut self, picture: &RgbImage) -> Result<(), SynthesisError> {
         let stopped = || std::io::Error::new(std::io::ErrorKind::BrokenPipe, "it takes no pictures");
         let pipe = self.process.stdin.as_mut().ok_or_else(stopped).map_err(SynthesisError::Encoder)?;
         pipe.write_all(picture.as_raw()).map_err(SynthesisError::Encoder)
     }
 
-    pub(crate) fn finish(mut self) -> Result<(), SynthesisError> {
+    /// Ends the file.
+    ///
+    /// # Errors
+    /// When `ffmpeg` reports a failure.
+    pub fn finish(mut self) -> Result<(), SynthesisError> {
         drop(self.process.stdin.take());
         let status = self.process.wait().map_err(SynthesisError::Encoder)?;
         if !status.success() {

@@ -75,7 +75,12 @@ fn chunks_are_valid_gltf() {
 #[test]
 fn the_pitch_of_a_stream_is_valid_gltf() {
     let folder = tempfile::tempdir().unwrap();
-    let header = StreamHeader { timescale: sample::TIMESCALE, pitch: Pitch::default(), people: Vec::new() };
+    let header = StreamHeader {
+        timescale: sample::TIMESCALE,
+        pitch: Pitch::default(),
+        people: Vec::new(),
+        segments: Vec::new(),
+    };
     let mut writer = StreamWriter::create(folder.path(), &header).unwrap();
     let frame = sample::frame_of(0, 0);
     writer

@@ -41,7 +41,8 @@ fn run(out: &Path, work: &Path) -> ReconstructReport {
     let options = ReconstructOptions {
         clip: demo("clip.mp4"),
         out: out.to_owned(),
-        calibration: demo("correspondences.json"),
+        calibration: Some(demo("correspondences.json")),
+        pitch: None,
         frames: Some(FRAMES),
         work: Some(work.to_owned()),
         budget: MeshBudget::default(),

@@ -2,16 +2,16 @@
 
 use std::time::Duration;
 
-use egui::{Button, ComboBox, Response, Slider, Ui, WidgetInfo};
+use egui::{Button, ComboBox, Rect, Response, Slider, Stroke, Ui, WidgetInfo};
 
-use protocol::playback::Speed;
+use protocol::{manifest::Segment, playback::Speed};
 
 use super::Look;
 use crate::{
     camera::Preset,
     placement::gesture::Event,
     session::Session,
-    timeline::{SPEEDS_PERCENT, speed_label},
+    timeline::{SPEEDS_PERCENT, Timeline, speed_label},
 };
 
 /// One press of a button turns by this angle, radians, and scales by this factor.
@@ -25,8 +25,28 @@ pub(crate) fn timeline(ui: &mut Ui, session: &mut Session, now: Duration) {
         return;
     };
     let mut frame = timeline.frame_at(session.position());
-    if slider(ui, &mut frame, timeline.frames() - 1).changed() {
+    let response = slider(ui, &mut frame, timeline.frames() - 1);
+    if response.changed() {
         session.seek(frame, now);
+    }
+    marks(ui, response.rect, &timeline, session.segments());
+}
+
+/// Where shots begin, and what the broadcast did not show, on the slider's rail.
+fn marks(ui: &Ui, rail: Rect, timeline: &Timeline, segments: &[Segment]) {
+    // The handle's middle travels this much less than the slider is wide.
+    let inset = ui.style().spacing.interact_size.y.min(rail.height()) / 2.5;
+    let x = |share: f32| egui::lerp(rail.left() + inset..=rail.right() - inset, share);
+    for mark in timeline.marks(segments) {
+        let (left, right) = (x(mark.start), x(mark.end));
+        let colour = ui.visuals().weak_text_color();
+        if mark.is_gap {
+            let band =
+                Rect::from_x_y_ranges(left..=right.max(left + 1.0), rail.center().y + 5.0..=rail.bottom());
+            ui.painter().rect_filled(band, 0.0, colour);
+        } else if mark.start > 0.0 {
+            ui.painter().vline(left, rail.center().y + 3.0..=rail.bottom(), Stroke::new(1.5, colour));
+        }
     }
 }
 

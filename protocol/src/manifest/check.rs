@@ -35,6 +35,22 @@ pub(super) fn manifest(manifest: &Manifest, limits: &Limits) -> Result<(), Manif
     if !manifest.people.iter().all(|person| ids.insert(person.id)) {
         return Err(value("people", "names an id twice"));
     }
+    limit("segments", manifest.segments.len(), limits.chunks)?;
+    let mut earliest = Ticks(0);
+    for (index, segment) in manifest.segments.iter().enumerate() {
+        // Differences cannot overflow where sums could.
+        let room = manifest.duration.0.checked_sub(segment.start.0);
+        if segment.start < earliest
+            || segment.duration <= Ticks(0)
+            || room.is_none_or(|room| segment.duration.0 > room)
+        {
+            return Err(value(
+                format!("segments[{index}]"),
+                "overlaps the segment before, goes on after the match's duration or lasts no time",
+            ));
+        }
+        earliest = segment.start + segment.duration;
+    }
     if let Some(entry) = &manifest.static_scene {
         file("static_scene", entry, limits)?;
     }

@@ -84,6 +84,19 @@ fn paths_cannot_leave_the_stream() {
 }
 
 #[test]
+fn segments_are_read_and_unknown_kinds_tolerated() {
+    let manifest = changed(|document| {
+        document["segments"] = json!([
+            {"start": 0, "duration": 5, "kind": "shot"},
+            {"start": 5, "duration": 2, "kind": "gap"},
+            {"start": 9, "duration": 1, "kind": "advertisement"}
+        ]);
+    });
+    let kinds: Vec<SegmentKind> = manifest.unwrap().segments.iter().map(|segment| segment.kind).collect();
+    assert_eq!(kinds, [SegmentKind::Shot, SegmentKind::Gap, SegmentKind::Other]);
+}
+
+#[test]
 fn impossible_values_are_named() {
     let named = |change: &dyn Fn(&mut Value)| changed(change).unwrap_err().to_string();
     let chunk = |document: &mut Value, index: usize, field: &str, value: Value| {
@@ -91,13 +104,25 @@ fn impossible_values_are_named() {
     };
     /// How the document is broken, and what the error names.
     type Case<'a> = (&'a dyn Fn(&mut Value), &'a str);
-    let cases: [Case<'_>; 12] = [
+    let cases: [Case<'_>; 16] = [
         (&|d| d["timescale"]["numerator"] = 0.into(), "timescale"),
         (&|d| d["timescale"]["denominator"] = 0.into(), "timescale"),
         (&|d| d["duration"] = (-1).into(), "duration"),
         (&|d| d["pitch"]["length_m"] = 0.0.into(), "pitch.length_m"),
         (&|d| d["pitch"]["width_m"] = 1e9.into(), "pitch.width_m"),
         (&|d| d["people"][1]["id"] = 0.into(), "people"),
+        (&|d| d["segments"] = json!([{"start": 0, "duration": 0, "kind": "shot"}]), "segments[0]"),
+        (&|d| d["segments"] = json!([{"start": -1, "duration": 5, "kind": "shot"}]), "segments[0]"),
+        (&|d| d["segments"] = json!([{"start": 5, "duration": i64::MAX, "kind": "gap"}]), "segments[0]"),
+        (
+            &|d| {
+                d["segments"] = json!([
+                    {"start": 0, "duration": 5, "kind": "shot"},
+                    {"start": 4, "duration": 5, "kind": "gap"}
+                ]);
+            },
+            "segments[1]",
+        ),
         (&|d| d["representations"] = json!([]), "representations"),
         (&|d| chunk(d, 1, "start", 5.into()), "high.chunks[1]"),
         (&|d| chunk(d, 0, "duration", 0.into()), "high.chunks[0]"),

@@ -11,12 +11,13 @@ use protocol::pitch::Pitch;
 use serde::Serialize;
 
 use super::{
-    Calibration, CalibrationError, CameraEstimate, calibrate, calibrate_pictures, overlay,
-    soccernet::SoccerNetCamera,
+    CalibrationError, CameraEstimate, ClipCameras, Finders, Given, Known, ShotFigures, calibrate_images,
+    calibrate_shots, overlay, shipped, soccernet::SoccerNetCamera,
 };
 use crate::{
-    ingest::{Clip, MAX_SIDE_PX},
+    ingest::MAX_SIDE_PX,
     report::{Progress, median},
+    shots::{self, Transition},
 };
 
 /// Bytes that decoding one picture may take.
@@ -27,13 +28,15 @@ const PICTURE_BYTES: u64 = 1 << 30;
 pub struct CalibrateOptions {
     /// One clip, or one or more pictures of one shot in order.
     pub inputs: Vec<PathBuf>,
-    /// The correspondences of one frame.
-    pub calibration: PathBuf,
+    /// Correspondences or cameras of some frames; everything is found without when `None`.
+    pub calibration: Option<PathBuf>,
+    /// The size of the pitch; when `None` that of `calibration`, else the usual one.
+    pub pitch: Option<Pitch>,
     /// Frames of the clip; all when `None`.
     pub frames: Option<Range<u32>>,
     /// Where the cameras go.
     pub out: PathBuf,
-    /// Folder for pictures with the lines drawn in, when wanted.
+    /// Folder for pictures with the lines drawn in, or an `.mp4` file for a video of them, when wanted.
     pub overlay: Option<PathBuf>,
 }
 
@@ -44,6 +47,10 @@ pub struct CalibrationReport {
     pub pitch: Pitch,
     /// Frames with a camera.
     pub solved: usize,
+    /// How the cameras of each shot came about.
+    pub shots: Vec<ShotFigures>,
+    /// Frames between shots.
+    pub transitions: Vec<Transition>,
     /// Median over the frames of their median line distance, pixels; `None` when no frame has lines.
     pub line_residual_median_px: Option<f64>,
     /// Greatest of the frames' median line distances, pixels.
@@ -69,51 +76,62 @@ pub struct FrameCamera {
 /// # Errors
 /// When an input cannot be read, the correspondences cannot be used, or a result cannot be written.
 pub fn run(options: &CalibrateOptions, progress: &Progress) -> Result<CalibrationReport, CalibrationError> {
-    let given = Calibration::read(&options.calibration)?;
-    let (frames, estimates) = match options.inputs.as_slice() {
+    let given = options.calibration.as_deref().map(Given::read).transpose()?;
+    let pitch = options.pitch.or(given.as_ref().and_then(Given::pitch)).unwrap_or_default();
+    let finders = Finders::new(&shipped);
+    let known = Known { pitch, given: given.as_ref(), finders: Some(&finders) };
+    let (frames, cameras, transitions) = match options.inputs.as_slice() {
         [] => return Err(CalibrationError::NoFrames),
         [clip] if !is_picture(clip) => {
-            let clip = Clip::open(clip, options.frames.clone())?;
-            let estimates = calibrate(&clip, &[], &given, progress)?;
-            if let Some(folder) = &options.overlay {
+            let (clip, shots) = shots::open(clip, options.frames.clone())?;
+            let cameras = calibrate_shots(&clip, &[], &shots, &known, progress)?;
+            let numbers: Vec<u32> = clip.info().frames.iter().map(|frame| frame.clip_frame).collect();
+            if let Some(out) = &options.overlay {
                 let pictures = clip.frames()?.map(|frame| Ok(frame?.image));
-                write_overlays(
-                    folder,
-                    pictures,
-                    clip.info().frames.iter().map(|f| f.clip_frame),
-                    &estimates,
-                    &given.pitch,
-                )?;
+                overlay::write(out, clip.info().rate(), pictures, &numbers, &cameras.frames, &pitch)?;
             }
-            (clip.info().frames.iter().map(|frame| frame.clip_frame).collect::<Vec<u32>>(), estimates)
+            (numbers, cameras, shots.transitions)
         }
         paths => {
             let pictures = read_pictures(paths)?;
-            let estimates = calibrate_pictures(pictures.clone(), &given)?;
-            if let Some(folder) = &options.overlay {
-                write_overlays(folder, pictures.into_iter().map(Ok), 0.., &estimates, &given.pitch)?;
+            let cameras = calibrate_images(&pictures, &known)?;
+            let numbers: Vec<u32> = (0..).take(paths.len()).collect();
+            if let Some(out) = &options.overlay {
+                let pictures = pictures.into_iter().map(Ok);
+                overlay::write(out, (1, 1), pictures, &numbers, &cameras.frames, &pitch)?;
             }
-            ((0..).take(paths.len()).collect(), estimates)
+            (numbers, cameras, Vec::new())
         }
     };
-    let residuals: Vec<f64> = estimates.iter().filter_map(|e| e.line_residual_median_px).collect();
-    let report = CalibrationReport {
-        pitch: given.pitch,
-        solved: estimates.iter().filter(|e| e.camera.is_some()).count(),
+    let report = report(pitch, frames, cameras, transitions);
+    write_report(&options.out, &report)?;
+    Ok(report)
+}
+
+fn report(
+    pitch: Pitch,
+    frames: Vec<u32>,
+    cameras: ClipCameras,
+    transitions: Vec<Transition>,
+) -> CalibrationReport {
+    let residuals: Vec<f64> = cameras.frames.iter().filter_map(|e| e.line_residual_median_px).collect();
+    CalibrationReport {
+        pitch,
+        solved: cameras.frames.iter().filter(|e| e.camera.is_some()).count(),
+        shots: cameras.shots,
+        transitions,
         line_residual_worst_px: residuals.iter().copied().max_by(f64::total_cmp),
         line_residual_median_px: median(&residuals),
         frames: frames
             .into_iter()
-            .zip(estimates)
+            .zip(cameras.frames)
             .map(|(clip_frame, estimate)| FrameCamera {
                 clip_frame,
                 soccernet: estimate.camera.as_ref().map(SoccerNetCamera::from),
                 estimate,
             })
             .collect(),
-    };
-    write_report(&options.out, &report)?;
-    Ok(report)
+    }
 }
 
 fn is_picture(path: &Path) -> bool {
@@ -142,26 +160,6 @@ fn read_pictures(paths: &[PathBuf]) -> Result<Vec<RgbImage>, CalibrationError> {
         pictures.push(picture);
     }
     Ok(pictures)
-}
-
-fn write_overlays(
-    folder: &Path,
-    pictures: impl Iterator<Item = Result<RgbImage, CalibrationError>>,
-    numbers: impl Iterator<Item = u32>,
-    estimates: &[CameraEstimate],
-    pitch: &Pitch,
-) -> Result<(), CalibrationError> {
-    let failed = |path: &Path, reason: String| CalibrationError::Write { path: path.into(), reason };
-    std::fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
-    for ((picture, number), estimate) in pictures.zip(numbers).zip(estimates) {
-        let mut picture = picture?;
-        if let Some(camera) = &estimate.camera {
-            overlay::draw(&mut picture, camera, pitch);
-        }
-        let path = folder.join(format!("{number:06}.png"));
-        picture.save(&path).map_err(|e| failed(&path, e.to_string()))?;
-    }
-    Ok(())
 }
 
 /// Writes beside the target first, so that a full disk leaves no half file.

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::ingest::IngestError;
+use super::soccernet::SoccerNetError;
+use crate::{inference::InferenceError, ingest::IngestError};
 
 /// Why no camera could be fitted.
 #[derive(Debug, thiserror::Error)]
@@ -138,6 +139,17 @@ pub enum CalibrationError {
         /// Median distance in pixels.
         residual_px: f64,
     },
+    /// A given camera that has no counterpart here.
+    #[error("the given camera of frame {frame} cannot be used: {source}")]
+    Camera {
+        /// Frame in the whole clip.
+        frame: u32,
+        /// What cannot be expressed.
+        source: SoccerNetError,
+    },
+    /// The network that finds cameras cannot be run.
+    #[error(transparent)]
+    Inference(#[from] InferenceError),
     /// The clip could not be read.
     #[error(transparent)]
     Ingest(#[from] IngestError),

@@ -103,17 +103,25 @@ pub(super) fn no_match_cost(scale_px: f64) -> f64 {
 pub(super) fn pull(camera: &Camera, sample: &Sample, map: &LineMap<'_>, scale_px: f64) -> Option<Pull> {
     let (pixel, rows) = project_with_derivatives(camera, sample.point)?;
     let normal = sample.normal(camera, pixel)?;
-    let offset = pixel - map.nearest(pixel, normal)?;
-    let along = MOST_ALONG_PX * f64::from(camera.height_px) / 720.0;
-    if offset.dot(normal.perp()).abs() > along {
-        return None;
-    }
-    let residual = offset.dot(normal);
+    let residual = (pixel - middle_near(camera, pixel, normal, map)?).dot(normal);
     let row = std::array::from_fn(|i| normal.x * rows[0][i] + normal.y * rows[1][i]);
-    let (squared, scale) = (residual * residual, scale_px * scale_px);
+    let (weight, cost) = robust(residual, scale_px);
+    Some(Pull { row, residual, weight, cost })
+}
+
+/// The middle of the line near a pixel, unless that is the end of another line.
+pub(super) fn middle_near(camera: &Camera, pixel: DVec2, normal: DVec2, map: &LineMap<'_>) -> Option<DVec2> {
+    let middle = map.nearest(pixel, normal)?;
+    let along = MOST_ALONG_PX * f64::from(camera.height_px) / 720.0;
+    ((pixel - middle).dot(normal.perp()).abs() <= along).then_some(middle)
+}
+
+/// Weight and cost of a distance across a line (Geman and McClure), in units of a line's error.
+pub(super) fn robust(residual_px: f64, scale_px: f64) -> (f64, f64) {
+    let (squared, scale) = (residual_px * residual_px, scale_px * scale_px);
     let unit = 1.0 / (LINE_SIGMA_PX * LINE_SIGMA_PX * POINTS_PER_ERROR);
     let bounded = scale / (scale + squared);
-    Some(Pull { row, residual, weight: unit * bounded * bounded, cost: unit * squared * bounded })
+    (unit * bounded * bounded, unit * squared * bounded)
 }
 
 /// Median distance in pixels from the visible line points to the nearest line pixel, and the number of points.

@@ -1,18 +1,65 @@
 //! Pictures for checking a camera by eye: the painted lines as the camera sees them, drawn over the frame.
 
+use std::path::Path;
+
+use glam::DVec3;
 use image::{Rgb, RgbImage};
 use imageproc::drawing::draw_line_segment_mut;
 use protocol::{
     camera::Camera,
     pitch::{GOAL_HEIGHT_M, GOAL_WIDTH_M, Pitch},
 };
+use synthesis::video::{Rate, Video};
 
-use glam::DVec3;
+use super::{CalibrationError, CameraEstimate};
 
 const MARKINGS: Rgb<u8> = Rgb([255, 30, 30]);
 const GOALS: Rgb<u8> = Rgb([255, 200, 0]);
 /// Length of the straight pieces that lines are drawn in, metres: short, so that distortion shows.
 const PIECE_M: f64 = 0.5;
+/// Quality of an overlay video: x264's CRF, good enough to judge a line by.
+const QUALITY: u8 = 20;
+
+/// Writes frames with the pitch of their camera drawn in: as numbered pictures into the folder `out`, or as a video when it is an
+/// `.mp4` file (`rate`: frames per second as a fraction; the `ffmpeg` program is needed for it). Frames without a camera stay
+/// as they are.
+///
+/// # Errors
+/// When a frame cannot be read, the disk says no, or the `ffmpeg` program is missing.
+pub fn write(
+    out: &Path,
+    rate: (u32, u32),
+    pictures: impl Iterator<Item = Result<RgbImage, CalibrationError>>,
+    numbers: &[u32],
+    estimates: &[CameraEstimate],
+    pitch: &Pitch,
+) -> Result<(), CalibrationError> {
+    let failed = |path: &Path, reason: String| CalibrationError::Write { path: path.into(), reason };
+    let as_video = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mp4"));
+    let folder = if as_video { out.parent().filter(|f| !f.as_os_str().is_empty()) } else { Some(out) };
+    if let Some(folder) = folder {
+        std::fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
+    }
+    let mut video = None;
+    for ((picture, number), estimate) in pictures.zip(numbers).zip(estimates) {
+        let mut picture = picture?;
+        if let Some(camera) = &estimate.camera {
+            draw(&mut picture, camera, pitch);
+        }
+        if !as_video {
+            let path = out.join(format!("{number:06}.png"));
+            picture.save(&path).map_err(|e| failed(&path, e.to_string()))?;
+            continue;
+        }
+        let started = match video.take() {
+            Some(video) => Ok(video),
+            None => Video::start(out, picture.dimensions(), rate, Rate::Quality(QUALITY)),
+        };
+        let pushed = started.and_then(|mut started| started.push(&picture).map(|()| started));
+        video = Some(pushed.map_err(|e| failed(out, e.to_string()))?);
+    }
+    video.map_or(Ok(()), |video| video.finish().map_err(|e| failed(out, e.to_string())))
+}
 
 /// Draws markings and goal frames of a pitch over a frame.
 pub fn draw(image: &mut RgbImage, camera: &Camera, pitch: &Pitch) {

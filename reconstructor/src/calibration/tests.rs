@@ -6,13 +6,15 @@ use glam::{DVec2, DVec3};
 use image::Rgb;
 use protocol::pitch::{Marking, Pitch};
 
-use super::*;
-use crate::report::median;
+use rayon::prelude::*;
 
-const SIZE: (u32, u32) = (960, 540);
+use super::{lines::LinePixels, *};
+use crate::{geometry::PixelBox, report::median};
+
+pub(super) const SIZE: (u32, u32) = (960, 540);
 
 /// Draws grass, stand and lines as `camera` sees them, two by two rays per pixel, with coding-like noise.
-fn drawn(camera: &Camera, pitch: &Pitch, seed: u32) -> RgbImage {
+pub(super) fn drawn(camera: &Camera, pitch: &Pitch, seed: u32) -> RgbImage {
     let markings = pitch.markings();
     let mut noise = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     RgbImage::from_fn(camera.width_px, camera.height_px, |x, y| {
@@ -41,7 +43,7 @@ fn colour_at(camera: &Camera, pitch: &Pitch, markings: &[Marking], pixel: DVec2)
 }
 
 /// A camera on a tripod that pans from the centre circle to the right and zooms in.
-fn broadcast(frame: usize) -> Camera {
+pub(super) fn broadcast(frame: usize) -> Camera {
     let t = frame as f64 / 30.0;
     let aim = DVec3::new(-2.0 + 22.0 * t, 0.0, -6.0 + 2.0 * t);
     let mut camera = Camera::looking_at(SIZE, 1250.0 + 250.0 * t, DVec3::new(1.5, 17.0, 70.0), aim);
@@ -50,7 +52,7 @@ fn broadcast(frame: usize) -> Camera {
 }
 
 /// Points of the centre circle and the halfway line as found by hand: up to a pixel off.
-fn by_hand(camera: &Camera, frame: u32) -> Calibration {
+pub(super) fn by_hand(camera: &Camera, frame: u32) -> Calibration {
     let places = [(0.0, -34.0), (0.0, -9.15), (0.0, 9.15), (-9.15, 0.0), (9.15, 0.0)];
     let points = places
         .iter()
@@ -65,7 +67,7 @@ fn by_hand(camera: &Camera, frame: u32) -> Calibration {
 }
 
 /// Distances in pixels between where two cameras see the part of the pitch that the first shows.
-fn reprojection(truth: &Camera, found: &Camera) -> Vec<f64> {
+pub(super) fn reprojection(truth: &Camera, found: &Camera) -> Vec<f64> {
     let mut errors = Vec::new();
     for x in -10..=10 {
         for z in -6..=6 {

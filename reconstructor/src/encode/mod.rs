@@ -16,7 +16,7 @@ use protocol::{
     chunk::{Ball, ChunkError, FrameQuality},
     glb::GlbError,
     hash::HashError,
-    manifest::{ManifestError, Person, PersonId},
+    manifest::{ManifestError, Person, PersonId, Segment},
     pitch::Pitch,
     time::{Ticks, Timescale},
 };
@@ -37,6 +37,8 @@ pub struct StreamHeader {
     pub pitch: Pitch,
     /// Everybody who appears in any frame.
     pub people: Vec<Person>,
+    /// Shots and gaps, in order of time; what lies after the last frame is left out when the stream is finished.
+    pub segments: Vec<Segment>,
 }
 
 /// One frame on its way into the stream.

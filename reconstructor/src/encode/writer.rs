@@ -10,7 +10,7 @@ use protocol::{
     chunk::{self, Body, Chunk, ChunkFrame},
     hash,
     limits::Limits,
-    manifest::{self, ChunkEntry, FileEntry, Manifest, PersonId, Representation},
+    manifest::{self, ChunkEntry, FileEntry, Manifest, PersonId, Representation, Segment},
     mesh::Mesh,
     time::Ticks,
 };
@@ -76,7 +76,16 @@ impl StreamWriter {
             return Err(EncodeError::UnknownPerson { clip_frame, person: stranger.person });
         }
         let second = self.header.timescale.ticks_in_nanoseconds(CHUNK_NANOSECONDS).max(Ticks(1));
-        if self.pending.frames.first().is_some_and(|first| frame.start >= first.start + second) {
+        // Whoever jumps to a shot needs no frame of the one before.
+        let new_shot = |last: &ChunkFrame| {
+            self.header
+                .segments
+                .iter()
+                .any(|segment| segment.start > last.start && segment.start <= frame.start)
+        };
+        if self.pending.frames.first().is_some_and(|first| frame.start >= first.start + second)
+            || self.pending.frames.last().is_some_and(new_shot)
+        {
             self.flush()?;
         }
         self.end = frame.start + frame.duration;
@@ -102,6 +111,16 @@ impl StreamWriter {
             pitch: self.header.pitch,
             static_scene: Some(self.static_scene),
             people: self.header.people,
+            segments: self
+                .header
+                .segments
+                .into_iter()
+                .filter(|segment| segment.start < self.end)
+                .map(|segment| Segment {
+                    duration: segment.duration.min(self.end - segment.start),
+                    ..segment
+                })
+                .collect(),
             representations: vec![Representation {
                 id: REPRESENTATION.to_owned(),
                 triangles_per_body: u32::try_from(self.triangles).unwrap_or(u32::MAX),

@@ -5,7 +5,7 @@ use image::{Rgb, RgbImage};
 use protocol::{
     chunk::FrameQuality,
     limits::Limits,
-    manifest::{FILE_NAME, Person, PersonId},
+    manifest::{FILE_NAME, Person, PersonId, SegmentKind},
     pitch::Pitch,
     sample,
     time::{Ticks, Timescale},
@@ -21,7 +21,31 @@ fn header(people: u32) -> StreamHeader {
         people: (0..people)
             .map(|id| Person { id: PersonId(id), team: None, role: None, number: None, shirt_rgb: None })
             .collect(),
+        segments: Vec::new(),
     }
+}
+
+#[test]
+fn a_shot_begins_a_chunk_and_segments_end_with_the_stream() {
+    let folder = tempfile::tempdir().unwrap();
+    let ticks = |frames: u32| frame(frames, 0).start;
+    let segment =
+        |from: u32, to: u32, kind| Segment { start: ticks(from), duration: ticks(to) - ticks(from), kind };
+    let segments = vec![
+        segment(0, 10, SegmentKind::Shot),
+        segment(10, 14, SegmentKind::Gap),
+        segment(14, 90, SegmentKind::Shot),
+        segment(90, 95, SegmentKind::Gap),
+    ];
+    let mut writer = StreamWriter::create(folder.path(), &StreamHeader { segments, ..header(1) }).unwrap();
+    for index in (0..10).chain(14..20) {
+        writer.push_frame(frame(index, 1)).unwrap();
+    }
+    let manifest = writer.finish().unwrap();
+    let starts: Vec<Ticks> = manifest.representations[0].chunks.iter().map(|chunk| chunk.start).collect();
+    assert_eq!(starts, [ticks(0), ticks(14)]);
+    assert_eq!(manifest.segments.len(), 3);
+    assert_eq!(manifest.segments[2].duration, ticks(20) - ticks(14));
 }
 
 /// The sample's people as surfaces: one flat colour per person.

@@ -35,6 +35,11 @@ impl Converter {
         Self::new(picture, Pixel::GRAY8, 1, size, Flags::AREA)
     }
 
+    /// To 8-bit RGB at `size`, each pixel the mean of its area.
+    pub(super) fn thumbnail(picture: &Video, size: (u32, u32)) -> Result<Self, ffmpeg::Error> {
+        Self::new(picture, Pixel::RGB24, 3, size, Flags::AREA)
+    }
+
     fn new(
         picture: &Video,
         format: Pixel,

@@ -31,6 +31,8 @@ pub const MAX_FRAMES: u32 = 900_000;
 
 /// Size of the grey signatures by which repeated pictures are found.
 const SIGNATURE_SIZE: (u32, u32) = (64, 36);
+/// Size of the colour thumbnails that [`Clip::open_watched`] hands out.
+pub const THUMBNAIL_SIZE: (u32, u32) = (64, 36);
 /// A repeated picture differs from the one before by coding noise only: no block of it by more than this, of 255.
 const DUPLICATE_BLOCK_DIFFERENCE: u8 = 3;
 
@@ -45,6 +47,16 @@ pub struct ClipInfo {
     pub timescale: Timescale,
     /// The frames of the chosen range, in order.
     pub frames: Vec<FrameTime>,
+}
+
+impl ClipInfo {
+    /// Frames per second as a fraction, from how long the first frame is shown.
+    #[must_use]
+    pub fn rate(&self) -> (u32, u32) {
+        let ticks = self.frames.first().map_or(1, |frame| frame.duration.0.max(1));
+        let per_frame = u64::from(self.timescale.denominator).saturating_mul(ticks.unsigned_abs());
+        (self.timescale.numerator, u32::try_from(per_frame).unwrap_or(u32::MAX).max(1))
+    }
 }
 
 /// When a frame is shown.
@@ -77,6 +89,9 @@ pub struct Clip {
     key: Option<KeyFrame>,
 }
 
+/// Sees the thumbnails of a clip's frames: RGB, row by row, [`THUMBNAIL_SIZE`].
+pub type Watch<'w> = &'w mut dyn FnMut(&[u8]);
+
 /// A place from which decoding can start: where [`Clip::frames`] seeks to.
 #[derive(Clone, Copy, Debug)]
 struct KeyFrame {
@@ -90,6 +105,23 @@ impl Clip {
     /// # Errors
     /// When the file is missing, has no video that can be decoded, is damaged inside the range, or the range is not in it.
     pub fn open(path: &Path, range: Option<Range<u32>>) -> Result<Self, IngestError> {
+        Self::survey(path, range, None)
+    }
+
+    /// As [`Clip::open`], and hands a thumbnail of every frame of the range to `watch`, in order: RGB, row by row,
+    /// [`THUMBNAIL_SIZE`], each pixel the mean of its area.
+    ///
+    /// # Errors
+    /// As [`Clip::open`].
+    pub fn open_watched(
+        path: &Path,
+        range: Option<Range<u32>>,
+        watch: Watch<'_>,
+    ) -> Result<Self, IngestError> {
+        Self::survey(path, range, Some(watch))
+    }
+
+    fn survey(path: &Path, range: Option<Range<u32>>, watch: Option<Watch<'_>>) -> Result<Self, IngestError> {
         let wanted = range.clone().unwrap_or(0..u32::MAX);
         let outside = |available| IngestError::Range {
             path: path.into(),
@@ -100,7 +132,7 @@ impl Clip {
         let mut source = Source::open(path, wanted.start)?;
         let timescale =
             source.timescale().ok_or_else(|| IngestError::NoTime { path: path.into(), frame: 0 })?;
-        let mut survey = Survey::new(path, &source);
+        let mut survey = Survey::new(path, &source, watch);
         let mut clip_frame = 0_u32;
         // One frame past the range tells how long the last one is shown.
         while clip_frame <= wanted.end {
@@ -170,7 +202,7 @@ impl Clip {
 }
 
 /// Collects times while [`Clip::open`] decodes.
-struct Survey {
+struct Survey<'w> {
     path: PathBuf,
     nominal: Option<i64>,
     previous: Option<i64>,
@@ -181,10 +213,12 @@ struct Survey {
     signature: Option<Vec<u8>>,
     frames: Vec<FrameTime>,
     key: Option<KeyFrame>,
+    watch: Option<Watch<'w>>,
+    thumbnails: Option<Converter>,
 }
 
-impl Survey {
-    fn new(path: &Path, source: &Source) -> Self {
+impl<'w> Survey<'w> {
+    fn new(path: &Path, source: &Source, watch: Option<Watch<'w>>) -> Self {
         Self {
             path: path.into(),
             nominal: source.nominal_duration(),
@@ -196,6 +230,8 @@ impl Survey {
             signature: None,
             frames: Vec::new(),
             key: None,
+            watch,
+            thumbnails: None,
         }
     }
 
@@ -232,6 +268,24 @@ impl Survey {
         let duration = self.frames.last().map(|last| last.duration.0).or(self.nominal).or(step).unwrap_or(1);
         let start = Ticks(timestamp - self.first);
         self.frames.push(FrameTime { clip_frame, start, duration: Ticks(duration), duplicate });
+        self.show(source, clip_frame)
+    }
+
+    /// Hands a thumbnail of the picture to whoever watches.
+    fn show(&mut self, source: &Source, clip_frame: u32) -> Result<(), IngestError> {
+        let Some(watch) = self.watch.as_mut() else { return Ok(()) };
+        let picture = source.picture();
+        let colour = |e: ffmpeg_the_third::Error| IngestError::Colour {
+            path: self.path.clone(),
+            frame: clip_frame,
+            reason: e.to_string(),
+        };
+        if self.thumbnails.as_ref().is_none_or(|thumbnails| !thumbnails.fits(picture)) {
+            self.thumbnails = Some(Converter::thumbnail(picture, THUMBNAIL_SIZE).map_err(colour)?);
+        }
+        if let Some(thumbnails) = self.thumbnails.as_mut() {
+            watch(&thumbnails.convert(picture).map_err(colour)?);
+        }
         Ok(())
     }
 

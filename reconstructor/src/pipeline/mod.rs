@@ -1,4 +1,4 @@
-//! The whole way from a clip to a stream: `ingest → detection → calibration → pose → tracking → segmentation → depth →
+//! The whole way from a clip to a stream: `ingest → shots → detection → calibration → pose → tracking → segmentation → depth →
 //! mesh → trajectory → encode`.
 //!
 //! Costly stages keep their results frame by frame in the work folder and take them from there when the clip, the options
@@ -14,6 +14,8 @@ mod work;
 mod write;
 
 use std::{ops::Range, path::PathBuf};
+
+use protocol::pitch::Pitch;
 
 pub use error::PipelineError;
 
@@ -31,8 +33,10 @@ pub struct ReconstructOptions {
     pub clip: PathBuf,
     /// Folder of the stream; an older stream in it is replaced.
     pub out: PathBuf,
-    /// Pitch points of one frame of the range, JSON.
-    pub calibration: PathBuf,
+    /// Pitch points or cameras of some frames, JSON; everything is found without when `None`.
+    pub calibration: Option<PathBuf>,
+    /// The size of the pitch; when `None` that of `calibration`, else the usual one.
+    pub pitch: Option<Pitch>,
     /// Frames of the clip; all when `None`.
     pub frames: Option<Range<u32>>,
     /// Where results of stages are kept; a temporary folder when `None`.

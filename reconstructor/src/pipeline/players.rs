@@ -35,7 +35,7 @@ impl Run<'_> {
     /// Who is who.
     pub(super) fn track(&mut self, people: &[Vec<Person>]) -> Result<Vec<Track>, PipelineError> {
         let started = Instant::now();
-        let tracks = tracking::track(people, self.clip.info(), &self.options.tracking);
+        let tracks = tracking::track_shots(people, self.clip.info(), &self.shots, &self.options.tracking);
         self.reporter.stage_done(Stage::Tracking, started.elapsed(), 0);
         if tracks.is_empty() {
             return Err(PipelineError::Nobody {

@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use protocol::pitch::Pitch;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::{
@@ -11,12 +12,13 @@ use super::{
     work::{Fingerprint, Results, WorkFolder},
 };
 use crate::{
-    calibration::{self, Calibration, CameraEstimate},
+    calibration::{self, CameraEstimate, ClipCameras, Finders, Given, Known},
     detection::{self, Detection, Detector},
     inference,
     ingest::{Clip, Frame},
     pose::{self, Person, PoseEstimator},
     report::{Failure, FrameFigures, Loss, ReconstructReport, Reporter, Stage},
+    shots::{self, ShotList},
 };
 
 /// A reconstruction under way.
@@ -24,7 +26,9 @@ pub(super) struct Run<'a> {
     pub(super) options: &'a ReconstructOptions,
     pub(super) reporter: &'a mut Reporter,
     pub(super) clip: Clip,
-    pub(super) calibration: Calibration,
+    pub(super) pitch: Pitch,
+    pub(super) shots: ShotList,
+    given: Option<Given>,
     work: WorkFolder,
     /// Grows stage by stage, so that a stage's results also depend on all stages before it.
     fingerprint: Fingerprint,
@@ -37,17 +41,15 @@ impl<'a> Run<'a> {
         reporter: &'a mut Reporter,
     ) -> Result<Self, PipelineError> {
         let started = Instant::now();
-        let calibration = Calibration::read(&options.calibration)?;
+        let given = options.calibration.as_deref().map(Given::read).transpose()?;
+        let pitch = options.pitch.or(given.as_ref().and_then(Given::pitch)).unwrap_or_default();
         inference::initialize(None)?;
-        let clip = Clip::open(&options.clip, options.frames.clone())?;
-        let info = clip.info();
-        calibration
-            .check(info.width_px, info.height_px)
-            .and_then(|()| calibration::start_in(info, &calibration))
-            .map_err(|source| PipelineError::Correspondences {
-                path: options.calibration.clone(),
-                source: Box::new(source),
-            })?;
+        let (clip, shots) = shots::open(&options.clip, options.frames.clone())?;
+        let known = Known { pitch, given: given.as_ref(), finders: None };
+        calibration::check_given(clip.info(), &known).map_err(|source| PipelineError::Correspondences {
+            path: options.calibration.clone().unwrap_or_default(),
+            source: Box::new(source),
+        })?;
         // A folder that cannot be written is known now, not after the long work.
         std::fs::create_dir_all(&options.out)
             .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
@@ -58,7 +60,8 @@ impl<'a> Run<'a> {
             clip.info().frames.iter().flat_map(|frame| frame.clip_frame.to_le_bytes()).collect();
         let work = WorkFolder::open(options.work.as_deref())?;
         reporter.stage_done(Stage::Ingest, started.elapsed(), 0);
-        Ok(Self { options, reporter, clip, calibration, work, fingerprint: fingerprint.with(&frames) })
+        let fingerprint = fingerprint.with(&frames);
+        Ok(Self { options, reporter, clip, pitch, shots, given, work, fingerprint })
     }
 
     pub(super) fn frame_count(&self) -> usize {
@@ -140,7 +143,9 @@ impl<'a> Run<'a> {
     /// People in every frame.
     pub(super) fn detect(&mut self) -> Result<Vec<Vec<Detection>>, PipelineError> {
         let results = self.results(Stage::Detection, detection::MODEL, &[])?;
-        let wanted = vec![true; self.frame_count()];
+        // Between shots there is no camera, so nobody could be placed.
+        let wanted: Vec<bool> =
+            (0..self.frame_count()).map(|frame| self.shots.shot_of(frame).is_some()).collect();
         let found = self.per_frame(
             Stage::Detection,
             &results,
@@ -157,19 +162,25 @@ impl<'a> Run<'a> {
         detections: &[Vec<Detection>],
     ) -> Result<Vec<CameraEstimate>, PipelineError> {
         let started = Instant::now();
-        let given = format!("{:?}", self.calibration);
-        let results = self.results(Stage::Calibration, "", &[given.as_bytes()])?;
-        let kept: Option<Vec<CameraEstimate>> = results.load(0);
-        let resumed = kept.as_ref().map_or(0, Vec::len);
+        let settings = format!("{:?} {:?} {:?}", self.pitch, self.given, self.shots);
+        // The network decides only in shots without a given camera, and may be missing when there are none.
+        let model = if inference::model_path(calibration::MODEL).is_ok() { calibration::MODEL } else { "" };
+        let results = self.results(Stage::Calibration, model, &[settings.as_bytes()])?;
+        let kept: Option<ClipCameras> = results.load(0);
+        let resumed = kept.as_ref().map_or(0, |cameras| cameras.frames.len());
         let cameras = match kept {
-            Some(cameras) if cameras.len() == self.frame_count() => cameras,
+            Some(cameras) if cameras.frames.len() == self.frame_count() => cameras,
             _ => {
                 let progress = self.reporter.progress(Stage::Calibration, self.frame_count());
-                let cameras = calibration::calibrate(&self.clip, detections, &self.calibration, &progress)?;
+                let finders = Finders::new(&calibration::shipped);
+                let known = Known { pitch: self.pitch, given: self.given.as_ref(), finders: Some(&finders) };
+                let cameras =
+                    calibration::calibrate_shots(&self.clip, detections, &self.shots, &known, &progress)?;
                 results.save(0, &cameras)?;
                 cameras
             }
         };
+        let cameras = cameras.frames;
         for (index, estimate) in cameras.iter().enumerate() {
             let (loss, reason) = match (&estimate.camera, &estimate.reason) {
                 (None, reason) => (Loss::LeftOut, reason.clone().unwrap_or_else(|| "no camera".to_owned())),
@@ -198,7 +209,7 @@ impl<'a> Run<'a> {
     ) -> Result<Vec<Vec<Person>>, PipelineError> {
         let results = self.results(Stage::Pose, pose::MODEL, &[])?;
         let wanted: Vec<bool> = cameras.iter().map(|estimate| estimate.camera.is_some()).collect();
-        let pitch = self.calibration.pitch;
+        let pitch = self.pitch;
         let people = self.per_frame(
             Stage::Pose,
             &results,

@@ -2,12 +2,13 @@
 
 use std::{
     collections::BTreeMap,
+    ops::Range,
     time::{Duration, Instant},
 };
 
 use protocol::{
     chunk::FrameQuality,
-    manifest::{Person as StreamPerson, PersonId},
+    manifest::{Person as StreamPerson, PersonId, Segment, SegmentKind},
 };
 
 use super::{
@@ -96,9 +97,37 @@ impl Run<'_> {
         });
         StreamHeader {
             timescale: self.clip.info().timescale,
-            pitch: self.calibration.pitch,
+            pitch: self.pitch,
             people: people.collect(),
+            segments: self.segments(scene.cameras),
         }
+    }
+
+    /// The shots of the clip as they are shown, and the stretches without a camera between them.
+    fn segments(&self, cameras: &[CameraEstimate]) -> Vec<Segment> {
+        let frames = &self.clip.info().frames;
+        let shown = |range: &Range<usize>| {
+            cameras.get(range.clone()).into_iter().flatten().any(|estimate| estimate.camera.is_some())
+        };
+        let mut ranges: Vec<Range<usize>> = self.shots.shots.iter().map(|shot| shot.frames.clone()).collect();
+        ranges.extend(self.shots.transitions.iter().map(|transition| transition.frames.clone()));
+        ranges.sort_by_key(|range| range.start);
+        let mut segments: Vec<Segment> = Vec::new();
+        for range in ranges {
+            let (Some(first), Some(last)) = (frames.get(range.start), frames.get(range.end - 1)) else {
+                continue;
+            };
+            let kind = if shown(&range) { SegmentKind::Shot } else { SegmentKind::Gap };
+            let duration = last.start + last.duration - first.start;
+            match segments.last_mut() {
+                // A dissolve beside a close-up: one stretch without a camera.
+                Some(before) if before.kind == SegmentKind::Gap && kind == SegmentKind::Gap => {
+                    before.duration = before.duration + duration;
+                }
+                _ => segments.push(Segment { start: first.start, duration, kind }),
+            }
+        }
+        segments
     }
 
     /// The figures of every frame, before it is known who has a mesh.

@@ -8,7 +8,7 @@ mod merge;
 use protocol::manifest::PersonId;
 use serde::{Deserialize, Serialize};
 
-use crate::{ingest::ClipInfo, pose::Person};
+use crate::{ingest::ClipInfo, pose::Person, shots::ShotList};
 
 /// One person over the clip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +71,33 @@ pub fn track(people: &[Vec<Person>], clip: &ClipInfo, limits: &TrackingLimits) -
     numbered.map(|(sightings, number)| Track { person: PersonId(number), sightings }).collect()
 }
 
+/// Links the people of each shot on its own: nobody is followed over a cut, and a person of two shots is two. Tracks are
+/// numbered from 1 through all shots; otherwise as [`track`].
+#[must_use]
+pub fn track_shots(
+    people: &[Vec<Person>],
+    clip: &ClipInfo,
+    shots: &ShotList,
+    limits: &TrackingLimits,
+) -> Vec<Track> {
+    let mut all: Vec<Track> = Vec::new();
+    for shot in &shots.shots {
+        let part = |length: usize| shot.frames.start.min(length)..shot.frames.end.min(length);
+        let frames = clip.frames.get(part(clip.frames.len())).unwrap_or_default().to_vec();
+        let of_shot = people.get(part(people.len())).unwrap_or_default();
+        for track in track(of_shot, &ClipInfo { frames, ..clip.clone() }, limits) {
+            let sightings = track
+                .sightings
+                .into_iter()
+                .map(|sighting| Sighting { frame: sighting.frame + shot.frames.start, ..sighting })
+                .collect();
+            let person = PersonId(u32::try_from(all.len() + 1).unwrap_or(u32::MAX));
+            all.push(Track { person, sightings });
+        }
+    }
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DVec2, DVec3};
@@ -81,6 +108,7 @@ mod tests {
     use crate::{
         geometry::{Mask, PixelBox},
         ingest::FrameTime,
+        shots::Shot,
     };
 
     fn at(x: f64, z: f64) -> Person {
@@ -166,6 +194,22 @@ mod tests {
         assert_eq!(track(&people[..3], &clip(3), &TrackingLimits::default()).len(), 1);
         assert_eq!(track(&people[..1], &clip(1), &TrackingLimits::default()).len(), 1);
         assert_eq!(track(&[], &clip(0), &TrackingLimits::default()), []);
+    }
+
+    #[test]
+    fn nobody_is_followed_over_a_cut() {
+        let people = vec![vec![at(1.0, 1.0)]; 60];
+        let cut = ShotList {
+            shots: vec![Shot { frames: 0..25 }, Shot { frames: 28..60 }],
+            transitions: Vec::new(),
+        };
+        let tracks = track_shots(&people, &clip(60), &cut, &TrackingLimits::default());
+        let spans: Vec<(usize, usize)> =
+            tracks.iter().map(|t| (t.sightings[0].frame, t.sightings.last().unwrap().frame)).collect();
+        assert_eq!(spans, [(0, 24), (28, 59)]);
+        assert_eq!(tracks.iter().map(|t| t.person.0).collect::<Vec<_>>(), [1, 2]);
+        let whole = track_shots(&people, &clip(60), &ShotList::single(60), &TrackingLimits::default());
+        assert_eq!(whole, track(&people, &clip(60), &TrackingLimits::default()));
     }
 
     #[test]

@@ -226,6 +226,7 @@ impl StreamWriter {
             pitch: fixture.stadium.pitch,
             static_scene: None,
             people,
+            segments: Vec::new(),
             representations: vec![Representation {
                 id: NAME.into(),
                 triangles_per_body: triangles,

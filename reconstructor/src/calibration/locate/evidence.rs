@@ -57,7 +57,11 @@ pub(super) struct Evidence {
     pub(super) pitch_share: f64,
     /// For every kind of line the cells that may show it.
     pub(super) shown: Vec<bool>,
-    impl Evidence {
+    /// How the picture lies in the network's input.
+    pub(super) fitted: Fitted,
+}
+
+impl Evidence {
     /// Lets every cell that may show the line `from` also show the line `to`.
     pub(super) fn also_shown(&mut self, from: usize, to: usize) {
         let plane = ROWS * COLUMNS;
@@ -69,13 +73,7 @@ pub(super) struct Evidence {
             }
         }
     }
-}
 
-/// How the picture lies in the network's input.
-    pub(super) fitted: Fitted,
-}
-
-impl Evidence {
     /// Whether the network sees a line of this name at a pixel, to a cell.
     pub(super) fn shows(&self, name: usize, pixel: DVec2) -> bool {
         let cell = self.fitted.cell(pixel).round();
@@ -218,7 +216,7 @@ impl Map<'_> {
             for x in 0..COLUMNS {
                 let value = self.at(x, y);
                 // NaN fails this comparison too.
-                if !(value >= LINE_MIN) {
+                if value.is_nan() || value < LINE_MIN {
                     continue;
                 }
                 let (left, right) = (if x > 0 { self.at(x - 1, y) } else { 0.0 }, self.at(x + 1, y));

@@ -208,9 +208,9 @@ mod tests {
                 .collect();
             let count = pairs.len();
             assert!(count >= 5, "{count} points");
-            for k in 0..wrong.min(count - 4) {
-                pairs[k].pixel = DVec2::new(100.0 + 300.0 * k as f64, 650.0);
-                pairs[k].weight = 0.4;
+            for (k, pair) in pairs.iter_mut().enumerate().take(wrong.min(count - 4)) {
+                pair.pixel = DVec2::new(100.0 + 300.0 * k as f64, 650.0);
+                pair.weight = 0.4;
             }
             let evidence = Evidence { size_px: (1280, 720), ..Evidence::default() };
             let found = hypotheses(&pairs, &evidence, &pitch);

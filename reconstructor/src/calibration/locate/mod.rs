@@ -112,7 +112,8 @@ impl Locator {
         if !best.as_ref().is_ok_and(|located| located.confidence >= CLEAR) {
             for end in [End::Left, End::Right] {
                 let other = self.read(&before_goal(&evidence, end), &named, pitch);
-                let confidence = |guess: &Result<Located, String>| guess.as_ref().map_or(0.0, |g| g.confidence);
+                let confidence =
+                    |guess: &Result<Located, String>| guess.as_ref().map_or(0.0, |g| g.confidence);
                 if confidence(&other) > confidence(&best) {
                     best = other;
                 }
