@@ -42,12 +42,12 @@ pub(crate) const MODEL: &str = "pitch.onnx";
 /// Fewer named points and crossings than this fix no camera.
 const PAIRS_MIN: usize = 3;
 /// A camera below this confidence is no camera.
-pub(crate) const CONFIDENCE_MIN: f64 = 0.5;
+pub(crate) const CONFIDENCE_MIN: f64 = 0.85;
 /// From this confidence on, other readings of the names are not tried.
 const CLEAR: f64 = 0.9;
 /// The painted lines may move the network's camera by this much: standard deviations of log focal length, rotation (radians),
 /// position (m) and k1.
-const POLISH_SIGMA: [f64; 8] = [0.04, 0.010, 0.010, 0.006, 2.0, 2.0, 2.0, 0.03];
+const POLISH_SIGMA: [f64; 8] = [0.06, 0.012, 0.012, 0.008, 4.0, 4.0, 4.0, 0.04];
 
 /// A camera found in a picture.
 #[derive(Clone, Copy, Debug)]

@@ -14,18 +14,18 @@ use super::{
 
 /// Distances at which a point counts half, one after the other, as shares of the picture's width.
 const SCALES: [f64; 3] = [0.03, 0.012, 0.006];
-/// Error of a named point and of a cell of a line, as shares of the picture's width: half a cell of the network.
-const POINT_SIGMA: f64 = 0.004;
-const LINE_SIGMA: f64 = 0.003;
+/// Error of a named point and of a cell of a line, as shares of the picture's width: a quarter of a cell of the network.
+const POINT_SIGMA: f64 = 0.002;
+const LINE_SIGMA: f64 = 0.0015;
 /// Neighbouring cells of a line share one error.
 const CELLS_PER_ERROR: f64 = 4.0;
 /// Main cameras: usual place and its spread, metres.
-const MAIN: (DVec3, DVec3) = (DVec3::new(0.0, 17.0, 60.0), DVec3::new(10.0, 9.0, 17.0));
+const MAIN: (DVec3, DVec3) = (DVec3::new(0.0, 17.0, 60.0), DVec3::new(15.0, 12.0, 25.0));
 /// Cameras behind the goal: height, distance from the goal line and spread, metres.
-const BEHIND: (DVec3, DVec3) = (DVec3::new(-25.0, 16.0, 0.0), DVec3::new(16.0, 9.0, 8.0));
+const BEHIND: (DVec3, DVec3) = (DVec3::new(-25.0, 16.0, 0.0), DVec3::new(25.0, 14.0, 12.0));
 /// Usual size of k1, and of the sine of the angle between picture and horizon.
-const RADIAL_SIGMA: f64 = 0.06;
-const ROLL_SIGMA: f64 = 0.012;
+const RADIAL_SIGMA: f64 = 0.08;
+const ROLL_SIGMA: f64 = 0.02;
 
 /// What the network can name, on a pitch of known size.
 pub(super) struct Named {
