@@ -123,19 +123,18 @@ fn flashes_and_graphics_are_no_cuts() {
         if t == 20 || t == 40 || t == 41 { mixed(&picture, &vec![255; picture.len()], 0.8) } else { picture }
     });
     assert_eq!(shots_of(flash), ShotList::single(60));
-    // A score graphic over a ninth of the picture appears at once, and another fades in.
+    // A graphic over a ninth of the picture appears at once and goes; a score board fades in.
     let graphics = (0..80).map(|t| {
         let mut picture = panned(1, t, 0.5);
-        let fade = ((t as f32 - 40.0) / 10.0).clamp(0.0, 1.0);
-        for y in 2..9 {
-            for x in 2..40 {
-                let at = 3 * (y * WIDTH + x);
-                if t >= 20 {
-                    picture[at..at + 3].copy_from_slice(&[10, 10, 60]);
-                }
-                let below = 3 * ((y + 24) * WIDTH + x);
-                for value in &mut picture[below..below + 3] {
-                    *value = (f32::from(*value) * (1.0 - fade) + 235.0 * fade) as u8;
+        let fade = ((t as f32 - 45.0) / 10.0).clamp(0.0, 1.0);
+        for (x, y) in (2..9).flat_map(|y| (2..40).map(move |x| (x, y))) {
+            let at = 3 * (y * WIDTH + x);
+            if (20..35).contains(&t) {
+                picture[at..at + 3].copy_from_slice(&[10, 10, 60]);
+            }
+            if x < 22 && y < 6 {
+                for value in &mut picture[at..at + 3] {
+                    *value = (f32::from(*value) * (1.0 - fade) + 20.0 * fade) as u8;
                 }
             }
         }
