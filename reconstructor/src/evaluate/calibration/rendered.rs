@@ -141,3 +141,37 @@ fn ground_errors_m(truth: &Camera, found: &Camera, pitch: &Pitch) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use synthesis::{
+        dataset::{FrameOptions, Split, broadcast_frames},
+        shots::ShotKind,
+    };
+
+    use super::{super::evaluate, *};
+
+    /// Also holds the names in `calibration::locate` and those that the shipped network was trained with together.
+    #[test]
+    fn the_shipped_network_finds_main_cameras_and_none_in_close_ups() {
+        if !crate::inference::ready() {
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let options = FrameOptions {
+            out: folder.path().to_owned(),
+            count: 6,
+            per_match: 2,
+            seed: 77,
+            split: Split::Test,
+            size_px: (640, 360),
+            maps: false,
+            kinds: vec![ShotKind::Main, ShotKind::Main, ShotKind::CloseUp],
+        };
+        broadcast_frames(&options, |_| ()).unwrap();
+        let figures = evaluate(folder.path(), &EvaluationOptions::default(), &Progress::hidden()).unwrap();
+        assert_eq!((figures.frames_without_pitch, figures.false_camera_rate), (2, Some(0.0)), "{figures:?}");
+        assert!(figures.frames >= 3 && figures.completeness > 0.7, "{figures:?}");
+        assert!(figures.ground_error_median_m.unwrap() < 0.3, "{figures:?}");
+    }
+}
