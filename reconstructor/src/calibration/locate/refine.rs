@@ -20,12 +20,12 @@ const LINE_SIGMA: f64 = 0.0015;
 /// Neighbouring cells of a line share one error.
 const CELLS_PER_ERROR: f64 = 4.0;
 /// Main cameras: usual place and its spread, metres.
-const MAIN: (DVec3, DVec3) = (DVec3::new(0.0, 17.0, 60.0), DVec3::new(15.0, 12.0, 25.0));
+const MAIN: (DVec3, DVec3) = (DVec3::new(0.0, 17.0, 60.0), DVec3::new(30.0, 20.0, 45.0));
 /// Cameras behind the goal: height, distance from the goal line and spread, metres.
-const BEHIND: (DVec3, DVec3) = (DVec3::new(-25.0, 16.0, 0.0), DVec3::new(25.0, 14.0, 12.0));
+const BEHIND: (DVec3, DVec3) = (DVec3::new(-25.0, 16.0, 0.0), DVec3::new(45.0, 22.0, 20.0));
 /// Usual size of k1, and of the sine of the angle between picture and horizon.
-const RADIAL_SIGMA: f64 = 0.08;
-const ROLL_SIGMA: f64 = 0.02;
+const RADIAL_SIGMA: f64 = 0.15;
+const ROLL_SIGMA: f64 = 0.05;
 
 /// What the network can name, on a pitch of known size.
 pub(super) struct Named {
