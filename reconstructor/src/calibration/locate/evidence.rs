@@ -219,11 +219,11 @@ impl Map<'_> {
                 if value.is_nan() || value < LINE_MIN {
                     continue;
                 }
-                // Beyond the edge the map is taken to go on as it is.
-                let left = if x > 0 { self.at(x - 1, y) } else { value };
-                let right = if x + 1 < COLUMNS { self.at(x + 1, y) } else { value };
-                let up = if y > 0 { self.at(x, y - 1) } else { value };
-                let down = if y + 1 < ROWS { self.at(x, y + 1) } else { value };
+                // Beyond the edge nobody knows: what lies there never makes a crest.
+                let left = if x > 0 { self.at(x - 1, y) } else { f32::INFINITY };
+                let right = if x + 1 < COLUMNS { self.at(x + 1, y) } else { f32::INFINITY };
+                let up = if y > 0 { self.at(x, y - 1) } else { f32::INFINITY };
+                let down = if y + 1 < ROWS { self.at(x, y + 1) } else { f32::INFINITY };
                 let steep_x = 2.0 * value - left - right;
                 let steep_y = 2.0 * value - up - down;
                 // Across the line the map falls off faster than along it.
