@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from common import average_in, rate_at
 from network import BIN_M, BINS, DepthNetwork, bin_centres, read_out
 from window import GRID, PICTURE_SIZE
 
@@ -168,7 +169,7 @@ def main():
             torch.save(network.state_dict(), out / "network.pt")
         if part >= 1.0:
             break
-        rate = arguments.rate * min(1.0, (steps + 1) / 100) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
+        rate = rate_at(arguments.rate, part, steps, warm_up=100)
         for group in optimizer.param_groups:
             group["lr"] = rate
         if len(order) < BATCH:
@@ -185,13 +186,7 @@ def main():
         steps += 1
         seen += BATCH
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()
-        with torch.no_grad():
-            keep = min(AVERAGE, steps / (steps + 20))
-            for mean, value in zip(average.state_dict().values(), network.state_dict().values()):
-                if mean.dtype.is_floating_point:
-                    mean.lerp_(value, 1 - keep)
-                else:
-                    mean.copy_(value)
+        average_in(average, network, steps, AVERAGE)
     (out / "run.json").write_text(json.dumps({"samples_seen": seen, "training_samples": len(data), "minutes": arguments.minutes, "seed": arguments.seed}))
 
 

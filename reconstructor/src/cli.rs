@@ -4,6 +4,7 @@ use std::{net::SocketAddr, ops::Range, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use protocol::pitch::Pitch;
+use reconstructor::calibration::is_possible;
 
 /// Turns a broadcast football clip into a match that stands on a table.
 #[derive(Debug, Parser)]
@@ -188,11 +189,12 @@ pub(crate) struct EvaluateCalibration {
     /// Where the figures go.
     #[arg(long, value_name = "FILE")]
     pub(crate) json: PathBuf,
-    /// Give four annotated points of each picture, as a person would, and measure at the others.
+    /// Give points as a person would: four annotated ones of each picture, measured at the others; a rendered clip's
+    /// correspondences.
     #[arg(long)]
     pub(crate) clicks: bool,
     /// Leave a part of the fit out, to see what it is worth; may be repeated.
-    #[arg(long, value_name = "PART")]
+    #[arg(long, value_name = "PART", conflicts_with = "clicks")]
     pub(crate) without: Vec<reconstructor::evaluate::calibration::Part>,
 }
 
@@ -257,8 +259,9 @@ fn pitch(text: &str) -> Result<Pitch, String> {
         length_m: length.trim().parse().map_err(|_| wrong())?,
         width_m: width.trim().parse().map_err(|_| wrong())?,
     };
-    let possible = (40.0..=150.0).contains(&pitch.length_m) && (30.0..=110.0).contains(&pitch.width_m);
-    possible.then_some(pitch).ok_or_else(|| format!("`{text}`: length is 40 to 150 m, width 30 to 110 m"))
+    is_possible(&pitch)
+        .then_some(pitch)
+        .ok_or_else(|| format!("`{text}`: length is 40 to 150 m, width 30 to 110 m"))
 }
 
 /// `WxH` as a size in pixels.

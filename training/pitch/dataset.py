@@ -183,7 +183,7 @@ def degrade(view, rng):
     grey = view.mean(2, keepdims=True)
     view = (grey + (view - grey) * rng.uniform(0.5, 1.4)) * gain.astype(np.float32) + rng.uniform(-25.0, 25.0)
     if rng.random() < 0.5:
-        view = np.clip(view, 0, 255) ** rng.uniform(0.8, 1.25) * 1.0
+        view = np.clip(view, 0, 255) ** rng.uniform(0.8, 1.25)
         view *= 255.0 / max(view.max(), 1.0) * rng.uniform(0.8, 1.0)
     if rng.random() < 0.3:  # a shadow of the stand over part of the pitch
         x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(-1, 1, HEIGHT))

@@ -6,8 +6,8 @@
 import argparse
 import csv
 import json
-import math
 import queue
+import sys
 import threading
 import time
 from pathlib import Path
@@ -17,6 +17,9 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
+
+from common import average_in, rate_at
 from dataset import Frames
 from network import PitchNetwork
 from points import CHANNELS, POINTS
@@ -147,7 +150,7 @@ def main():
             torch.save(network.state_dict(), out / "network.pt")
         if part >= 1.0:
             break
-        rate = arguments.rate * min(1.0, (steps + 1) / 150) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
+        rate = rate_at(arguments.rate, part, steps, warm_up=150)
         for group in optimizer.param_groups:
             group["lr"] = rate
         pictures, maps = next(supply)
@@ -159,13 +162,7 @@ def main():
         steps += 1
         seen += BATCH
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()
-        with torch.no_grad():
-            keep = min(AVERAGE, steps / (steps + 20))
-            for mean, value in zip(average.state_dict().values(), network.state_dict().values()):
-                if mean.dtype.is_floating_point:
-                    mean.lerp_(value, 1 - keep)
-                else:
-                    mean.copy_(value)
+        average_in(average, network, steps, AVERAGE)
     summary = {"samples_seen": seen, "training_samples": len(data), "minutes": arguments.minutes, "seed": arguments.seed}
     (out / "run.json").write_text(json.dumps(summary))
 

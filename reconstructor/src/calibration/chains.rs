@@ -10,7 +10,7 @@ use protocol::camera::Camera;
 use rayon::prelude::*;
 
 use super::{
-    CameraEstimate,
+    CameraEstimate, locate,
     sequence::{FrameLines, follow, settle},
     template::Sample,
 };
@@ -20,8 +20,8 @@ use crate::report::median;
 const AGREE_PX: f64 = 12.0;
 /// What a frame counts against a run when no camera was found in it: that may be for want of lines.
 const REFUSED_VOTE: f64 = 0.1;
-/// Votes that a run needs: one camera that is more likely right than wrong, or several that are not but agree.
-const LEAST_VOTES: f64 = 0.5;
+/// Votes that a run needs: one camera that is sure alone, or several that are not but agree.
+const LEAST_VOTES: f64 = locate::CONFIDENCE_MIN;
 
 /// A camera known or found for one frame of the shot.
 #[derive(Clone, Debug)]

@@ -5,25 +5,13 @@
 use std::sync::{Mutex, PoisonError};
 
 use image::RgbImage;
-use protocol::{camera::Camera, pitch::Pitch};
+use protocol::pitch::Pitch;
 
-use super::locate::{self, Locator};
-use crate::{
-    geometry::PixelBox,
-    inference::{self, InferenceError},
-};
+use super::locate::{self, Located, Locator};
+use crate::{geometry::PixelBox, inference::InferenceError};
 
 /// File name of the network that finds cameras.
 pub const MODEL: &str = locate::MODEL;
-
-/// A camera found in one picture.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Located {
-    /// The camera.
-    pub camera: Camera,
-    /// How likely it is right, 0..1.
-    pub confidence: f64,
-}
 
 /// Finds the camera of one picture by itself.
 pub trait FindCamera: Send {
@@ -43,7 +31,7 @@ pub trait FindCamera: Send {
 /// Makes one [`FindCamera`] per worker.
 pub type LoadFinder<'a> = dyn Fn() -> Result<Box<dyn FindCamera>, InferenceError> + Sync + 'a;
 
-/// A guess below this probability is worse than none.
+/// A guess below this confidence is worse than none.
 const LEAST_CONFIDENCE: f64 = 0.1;
 
 impl FindCamera for Locator {
@@ -56,9 +44,10 @@ impl FindCamera for Locator {
     ) -> Result<Result<Located, String>, InferenceError> {
         let guess = self.guess(picture, people, pitch)?;
         Ok(guess.and_then(|found| {
-            let locate::Located { camera, confidence } = found;
-            let unsure = || format!("the best guess of a camera is right with probability {confidence:.2}");
-            (confidence >= LEAST_CONFIDENCE).then_some(Located { camera, confidence }).ok_or_else(unsure)
+            let unsure = || {
+                format!("no pitch camera here: the best guess has a confidence of {:.2}", found.confidence)
+            };
+            (found.confidence >= LEAST_CONFIDENCE).then_some(found).ok_or_else(unsure)
         }))
     }
 }
@@ -68,7 +57,6 @@ impl FindCamera for Locator {
 /// # Errors
 /// When ONNX Runtime or the network is missing or unusable.
 pub fn shipped() -> Result<Box<dyn FindCamera>, InferenceError> {
-    inference::initialize(None)?;
     Ok(Box::new(Locator::load()?))
 }
 

@@ -118,10 +118,16 @@ pub(super) fn middle_near(camera: &Camera, pixel: DVec2, normal: DVec2, map: &Li
 
 /// Weight and cost of a distance across a line (Geman and McClure), in units of a line's error.
 pub(super) fn robust(residual_px: f64, scale_px: f64) -> (f64, f64) {
-    let (squared, scale) = (residual_px * residual_px, scale_px * scale_px);
+    let squared = residual_px * residual_px;
     let unit = 1.0 / (LINE_SIGMA_PX * LINE_SIGMA_PX * POINTS_PER_ERROR);
-    let bounded = scale / (scale + squared);
+    let bounded = geman_mcclure(squared, scale_px);
     (unit * bounded * bounded, unit * squared * bounded)
+}
+
+/// What a squared distance counts for of what it would without a bound: 1 at no distance, ½ at `scale_px`.
+pub(super) fn geman_mcclure(squared_px: f64, scale_px: f64) -> f64 {
+    let scale = scale_px * scale_px;
+    scale / (scale + squared_px)
 }
 
 /// Median distance in pixels from the visible line points to the nearest line pixel, and the number of points.

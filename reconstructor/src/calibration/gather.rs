@@ -7,12 +7,7 @@ use std::collections::BTreeMap;
 use protocol::pitch::Pitch;
 use rayon::prelude::*;
 
-use super::{
-    CalibrationError,
-    find::{Finders, Located},
-    lines::LinePixels,
-    sequence::FrameLines,
-};
+use super::{CalibrationError, find::Finders, lines::LinePixels, locate::Located, sequence::FrameLines};
 use crate::{
     detection::Detection,
     geometry::PixelBox,

@@ -1,6 +1,6 @@
 //! What is given by hand or by another program: points of one frame, or cameras of some frames in SoccerNet's terms.
 
-use std::{io::Read, path::Path};
+use std::path::Path;
 
 use protocol::{camera::Camera, pitch::Pitch};
 use serde::Deserialize;
@@ -9,6 +9,7 @@ use super::{
     Calibration, CalibrationError, Known,
     chains::Anchor,
     grass, initial,
+    input::read_file,
     sequence::{self, FrameLines},
     soccernet::SoccerNetCamera,
     template::Sample,
@@ -68,17 +69,11 @@ impl Given {
     /// # Errors
     /// When it cannot be read or is none of these. Points and cameras are checked when they are used.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        let read = |source| CalibrationError::Read { path: path.into(), source };
-        let file = std::fs::File::open(path).map_err(read)?;
-        let mut text = Vec::new();
-        file.take(MAX_FILE_BYTES + 1).read_to_end(&mut text).map_err(read)?;
-        if text.len() as u64 > MAX_FILE_BYTES {
-            return Err(CalibrationError::TooLarge { path: path.into(), limit_bytes: MAX_FILE_BYTES });
-        }
+        let text = read_file(path, MAX_FILE_BYTES)?;
         // A message about points is the most helpful one for a file that is neither.
         match serde_json::from_slice::<CameraFile>(&text) {
             Ok(file) => Ok(Self::from(file)),
-            Err(_) => Calibration::read(path).map(Self::Points),
+            Err(_) => Calibration::parse(path, &text).map(Self::Points),
         }
     }
 
@@ -158,18 +153,20 @@ pub(super) fn anchors(
     }
 }
 
-/// Whether given cameras go with the lines of their frames. Of several in a shot the worst may be wrong, not all.
+/// Whether given cameras go with the lines of their frames; `numbers` are the clip frames of `frames`. Of several in a shot the worst may be wrong, not all.
 pub(super) fn check(
     given: &[Anchor],
+    numbers: &[u32],
     frames: &[FrameLines],
     shots: &ShotList,
     samples: &[Sample],
 ) -> Result<(), CalibrationError> {
     let mut first_error = None;
     for anchor in given {
-        let number = u32::try_from(anchor.index).unwrap_or(u32::MAX);
+        let (Some(frame), Some(&number)) = (frames.get(anchor.index), numbers.get(anchor.index)) else {
+            continue;
+        };
         let no_pitch = |reason: String| CalibrationError::NoPitch { frame: number, reason };
-        let Some(frame) = frames.get(anchor.index) else { continue };
         let share = frame.lines.grass_share;
         let error = if share < grass::LEAST_SHARE {
             no_pitch(format!("grass covers {:.0} % of it", share * 100.0))

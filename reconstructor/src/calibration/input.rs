@@ -44,20 +44,36 @@ pub struct Calibration {
     pub points: Vec<Correspondence>,
 }
 
+/// Whether a match can be played on a pitch of this size: length 40 to 150 m, width 30 to 110 m.
+#[must_use]
+pub fn is_possible(pitch: &Pitch) -> bool {
+    (40.0..=150.0).contains(&pitch.length_m) && (30.0..=110.0).contains(&pitch.width_m)
+}
+
+/// A file of at most `limit_bytes`.
+pub(super) fn read_file(path: &Path, limit_bytes: u64) -> Result<Vec<u8>, CalibrationError> {
+    let read = |source| CalibrationError::Read { path: path.into(), source };
+    let file = std::fs::File::open(path).map_err(read)?;
+    let mut bytes = Vec::new();
+    file.take(limit_bytes + 1).read_to_end(&mut bytes).map_err(read)?;
+    if bytes.len() as u64 > limit_bytes {
+        return Err(CalibrationError::TooLarge { path: path.into(), limit_bytes });
+    }
+    Ok(bytes)
+}
+
 impl Calibration {
     /// Reads a `--calibration` file.
     ///
     /// # Errors
     /// When it cannot be read or is not a correspondence file. The points are checked when they are used.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        let read = |source| CalibrationError::Read { path: path.into(), source };
-        let file = std::fs::File::open(path).map_err(read)?;
-        let mut text = Vec::new();
-        file.take(MAX_FILE_BYTES + 1).read_to_end(&mut text).map_err(read)?;
-        if text.len() as u64 > MAX_FILE_BYTES {
-            return Err(CalibrationError::TooLarge { path: path.into(), limit_bytes: MAX_FILE_BYTES });
-        }
-        serde_json::from_slice(&text).map_err(|source| CalibrationError::Parse { path: path.into(), source })
+        Self::parse(path, &read_file(path, MAX_FILE_BYTES)?)
+    }
+
+    /// As [`read`](Self::read), of a file's bytes.
+    pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Self, CalibrationError> {
+        serde_json::from_slice(text).map_err(|source| CalibrationError::Parse { path: path.into(), source })
     }
 
     /// Whether the points can fix a camera of pictures of this size.
@@ -66,7 +82,7 @@ impl Calibration {
     /// Names the first thing that is wrong with them.
     pub fn check(&self, width_px: u32, height_px: u32) -> Result<(), CalibrationError> {
         let Pitch { length_m, width_m } = self.pitch;
-        if !(40.0..=150.0).contains(&length_m) || !(30.0..=110.0).contains(&width_m) {
+        if !is_possible(&self.pitch) {
             return Err(CalibrationError::BadPitch { length_m, width_m });
         }
         for (index, point) in self.points.iter().enumerate() {

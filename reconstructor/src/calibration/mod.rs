@@ -35,9 +35,10 @@ use protocol::{camera::Camera, pitch::Pitch};
 use serde::{Deserialize, Serialize};
 
 pub use error::CalibrationError;
-pub use find::{FindCamera, Finders, LoadFinder, Located, MODEL, shipped};
+pub use find::{FindCamera, Finders, LoadFinder, MODEL, shipped};
 pub use given::Given;
-pub use input::{Calibration, Correspondence};
+pub use input::{Calibration, Correspondence, is_possible};
+pub use locate::Located;
 pub use shot::ShotFigures;
 pub use tripod::Lens;
 
@@ -167,11 +168,13 @@ pub fn calibrate_shots(
         return Err(CalibrationError::PeopleMismatch { people: people.len(), frames: info.frames.len() });
     }
     // Before the long part: what cannot work is refused at once.
-    let given = given::anchors(known, &numbers(info), (info.width_px, info.height_px))?;
+    let numbers = numbers(info);
+    let given = given::anchors(known, &numbers, (info.width_px, info.height_px))?;
     let frames = gather::lines(clip.frames()?, people, &|| progress.advance(1))?;
     let look = |wanted: &[usize], finders: &Finders<'_>| {
         gather::cameras(clip.frames()?, people, wanted, finders, &known.pitch)
     };
+    given::check(&given, &numbers, &frames, shots, &template::samples(&known.pitch))?;
     solve(&frames, shots, given, known, &look)
 }
 
@@ -208,6 +211,7 @@ fn images(
     let frames = gather::lines(all(), &[], &|| {})?;
     let look =
         |wanted: &[usize], finders: &Finders<'_>| gather::cameras(all(), &[], wanted, finders, &known.pitch);
+    given::check(&given, &numbers, &frames, shots, &template::samples(&known.pitch))?;
     solve(&frames, shots, given, known, &look)
 }
 
@@ -223,7 +227,6 @@ fn solve(
     look: &Look<'_>,
 ) -> Result<ClipCameras, CalibrationError> {
     let samples = template::samples(&known.pitch);
-    given::check(&given, frames, shots, &samples)?;
     let mut all: Vec<ShotInWork> = shots
         .shots
         .iter()
@@ -326,7 +329,7 @@ impl ShotInWork {
             let index = index - self.frames.start;
             match attempt {
                 Ok(found) => {
-                    let Located { camera, confidence } = found.clone();
+                    let Located { camera, confidence } = *found;
                     self.anchors.push(Anchor { index, camera, confidence, given: false });
                 }
                 Err(reason) => self.refused.push((index, reason.clone())),

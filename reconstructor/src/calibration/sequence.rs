@@ -31,6 +31,7 @@ pub(super) struct FrameLines {
 const MOTION_SIGMA: Row = spread(0.02, [0.010, 0.015, 0.002], 0.05, 0.003);
 /// How the first camera differs from the one that a few points found by hand gave.
 const FIRST_SIGMA: Row = spread(0.15, [0.03, 0.03, 0.02], 4.0, 0.08);
+
 /// Standard deviations of a camera's parameters: logarithm of the focal length, angles (radians), position, k1.
 pub(super) const fn spread(log_focal: f64, turn: [f64; 3], position_m: f64, k1: f64) -> Row {
     let mut row = [0.0; 8];
@@ -48,12 +49,20 @@ pub(super) const fn spread(log_focal: f64, turn: [f64; 3], position_m: f64, k1: 
 /// The first camera, moved onto the lines of its frame, with its estimate.
 pub(super) fn settle(first: &Camera, frame: &FrameLines, samples: &[Sample]) -> CameraEstimate {
     let map = frame.lines.map();
-    let mut camera = *first;
-    // Twice: the points that are visible are chosen again once the camera is better.
-    for _ in 0..2 {
-        camera = fit(&Expectation { camera, sigma: FIRST_SIGMA }, samples, &frame.people, &map);
-    }
+    let camera = onto_lines(first, FIRST_SIGMA, samples, &frame.people, &map);
     judge(&camera, frame, samples, &map)
+}
+
+/// A camera moved onto the lines of its picture, by about `sigma` at most.
+pub(super) fn onto_lines(
+    first: &Camera,
+    sigma: Row,
+    samples: &[Sample],
+    people: &[PixelBox],
+    map: &LineMap<'_>,
+) -> Camera {
+    // Twice: the points that are visible are chosen again once the camera is better.
+    (0..2).fold(*first, |camera, _| fit(&Expectation { camera, sigma }, samples, people, map))
 }
 
 /// The cameras of the frames around `start`, where the camera is known: as far as the lines can be followed in both

@@ -102,9 +102,9 @@ pub fn broadcast_frames(
     options: &FrameOptions,
     progress: impl Fn(usize) + Sync,
 ) -> Result<(), SynthesisError> {
-    if options.count == 0 || options.per_match == 0 {
+    if options.count == 0 || options.per_match == 0 || options.kinds.is_empty() {
         return Err(SynthesisError::Options(
-            "a set needs at least one picture, in all and of a match".into(),
+            "a set needs at least one picture, in all and of a match, and one kind of camera".into(),
         ));
     }
     for folder in ["images", "labels", "maps"].iter().filter(|name| **name != "maps" || options.maps) {
@@ -132,8 +132,7 @@ fn one_match(
 ) -> Result<Vec<u8>, SynthesisError> {
     let seed = match_seed(options, index);
     let frames = (MATCH_S * f64::from(FRAME_RATE)) as usize;
-    let kinds = options.kinds.len().max(1);
-    let kind = options.kinds.get(index % kinds).copied().unwrap_or(ShotKind::Main);
+    let kind = options.kinds[index % options.kinds.len()];
     let mut fixture = Fixture::new(
         &Trajectories::generated(seed, MATCH_S + 1.0),
         &FixtureOptions {

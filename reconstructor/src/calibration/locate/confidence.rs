@@ -52,7 +52,8 @@ impl Agreement {
         Self { explained, seen: seen(camera, evidence, named), support }
     }
 
-    /// Probability that the camera is right: a logistic regression on rendered pictures.
+    /// The shares as one score 0..1: a logistic function whose weights were set by hand, so no probability. The evaluation's
+    /// reliability table says how often a score was right.
     pub(super) fn confidence(&self) -> f64 {
         let logit = 8.0 * (self.explained - 0.6) + 6.0 * (self.seen - 0.45) + 0.25 * (self.support - 6.0);
         1.0 / (1.0 + (-logit).exp())

@@ -8,8 +8,6 @@
 use glam::{DMat3, DVec2, DVec3};
 use protocol::{camera::Camera, pitch::Pitch};
 
-use super::evidence::Evidence;
-
 /// Pairs are drawn from this many points, the surest first.
 const POINTS_MAX: usize = 16;
 /// Two points nearer to each other than this share of the picture's width fix no focal length.
@@ -45,10 +43,10 @@ fn places(pitch: &Pitch) -> Vec<DVec3> {
     let (half_x, half_z) = (pitch.length_m / 2.0, pitch.width_m / 2.0);
     let mut all = Vec::new();
     for beyond in [9.0, 17.0, 28.0, 45.0] {
-        for slope in [0.30, 0.48, 0.75] {
+        for slope in [0.225, 0.36, 0.5625] {
             let z = half_z + beyond;
             for x in [0.0, -14.0, 14.0] {
-                all.push(DVec3::new(x, (slope * z * 0.75).clamp(7.0, 40.0), z));
+                all.push(DVec3::new(x, (slope * z).clamp(7.0, 40.0), z));
             }
         }
     }
@@ -63,11 +61,10 @@ fn places(pitch: &Pitch) -> Vec<DVec3> {
 }
 
 /// The best cameras, best first.
-pub(super) fn hypotheses(pairs: &[Pair], evidence: &Evidence, pitch: &Pitch) -> Vec<Camera> {
+pub(super) fn hypotheses(pairs: &[Pair], (width, height): (u32, u32), pitch: &Pitch) -> Vec<Camera> {
     let mut sure: Vec<Pair> = pairs.to_vec();
     sure.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let chosen = sure.get(..POINTS_MAX.min(sure.len())).unwrap_or_default();
-    let (width, height) = evidence.size_px;
     let apart = APART * f64::from(width);
     let mut found: Vec<(Camera, f64)> = Vec::new();
     for position in places(pitch) {
@@ -212,8 +209,7 @@ mod tests {
                 pair.pixel = DVec2::new(100.0 + 300.0 * k as f64, 650.0);
                 pair.weight = 0.4;
             }
-            let evidence = Evidence { size_px: (1280, 720), ..Evidence::default() };
-            let found = hypotheses(&pairs, &evidence, &pitch);
+            let found = hypotheses(&pairs, (1280, 720), &pitch);
             let near = found.iter().any(|c| {
                 let right = &pairs[wrong..];
                 let close = |p: &&Pair| c.project(p.world).is_some_and(|at| at.distance(p.pixel) < 60.0);

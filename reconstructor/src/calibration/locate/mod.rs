@@ -19,8 +19,8 @@ use image::RgbImage;
 use protocol::{camera::Camera, pitch::Pitch};
 
 use super::{
-    fit::{Expectation, fit, residual},
-    least_squares::RADIAL,
+    fit::residual,
+    least_squares::{RADIAL, Row},
     lines::LinePixels,
     sequence, template,
 };
@@ -32,6 +32,7 @@ use crate::{
 use confidence::Agreement;
 use evidence::Evidence;
 use hypotheses::Pair;
+pub(crate) use names::points as pitch_points;
 use readings::{End, before_goal};
 pub(crate) use refine::Terms;
 use refine::{Named, refine};
@@ -41,25 +42,24 @@ pub(crate) const MODEL: &str = "pitch.onnx";
 
 /// Fewer named points and crossings than this fix no camera.
 const PAIRS_MIN: usize = 3;
-/// A camera below this confidence is no camera.
+/// A camera that nothing else speaks for needs this confidence.
 pub(crate) const CONFIDENCE_MIN: f64 = 0.85;
 /// From this confidence on, other readings of the names are not tried.
 const CLEAR: f64 = 0.9;
-/// The painted lines may move the network's camera by this much: standard deviations of log focal length, rotation (radians),
-/// position (m) and k1.
-const POLISH_SIGMA: [f64; 8] = [0.06, 0.012, 0.012, 0.008, 4.0, 4.0, 4.0, 0.04];
+/// How far the painted lines may move the network's camera.
+const POLISH_SIGMA: Row = sequence::spread(0.06, [0.012, 0.012, 0.008], 4.0, 0.04);
 
 /// A camera found in a picture.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Located {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Located {
     /// The camera.
-    pub(crate) camera: Camera,
-    /// Probability 0..1 that it is right to a hundredth of the picture's width, as measured on rendered pictures.
-    pub(crate) confidence: f64,
+    pub camera: Camera,
+    /// How sure, 0..1: a score of how far the camera and what was named agree, no probability.
+    pub confidence: f64,
 }
 
 impl Located {
-    /// Whether the camera is to be used.
+    /// Whether the camera is to be used though nothing else speaks for it.
     pub(crate) fn is_sure(&self) -> bool {
         self.confidence >= CONFIDENCE_MIN
     }
@@ -120,17 +120,13 @@ impl Locator {
             }
         }
         Ok(best.map(|located| {
-            let camera = if self.terms.polish {
-                polish(&located.camera, picture, people, pitch, self.terms)
-            } else {
-                located.camera
-            };
-            Located { camera, ..located }
+            if !self.terms.polish {
+                return located;
+            }
+            Located { camera: polish(&located.camera, picture, people, pitch, self.terms), ..located }
         }))
     }
-}
 
-impl Locator {
     /// The best camera for one reading of the evidence.
     fn read(&self, evidence: &Evidence, named: &Named, pitch: &Pitch) -> Result<Located, String> {
         let (camera, _) = explain(evidence, named, pitch, self.terms)?;
@@ -142,8 +138,8 @@ impl Locator {
 
 /// The camera that explains the evidence best, and its cost.
 fn explain(evidence: &Evidence, named: &Named, pitch: &Pitch, terms: Terms) -> Result<(Camera, f64), String> {
-    let mut pairs: Vec<Pair> = evidence
-        .points
+    let points = if terms.points { evidence.points.as_slice() } else { &[] };
+    let mut pairs: Vec<Pair> = points
         .iter()
         .filter_map(|point| {
             let world = *named.points.get(point.name).filter(|world| world.y == 0.0)?;
@@ -156,7 +152,7 @@ fn explain(evidence: &Evidence, named: &Named, pitch: &Pitch, terms: Terms) -> R
     if pairs.len() < PAIRS_MIN {
         return Err(format!("no pitch camera here: {} points of a pitch are seen", pairs.len()));
     }
-    hypotheses::hypotheses(&pairs, evidence, pitch)
+    hypotheses::hypotheses(&pairs, evidence.size_px, pitch)
         .iter()
         .map(|start| refine(start, evidence, named, terms))
         .filter(|(camera, cost)| cost.is_finite() && camera.position.y > 2.0)
@@ -174,11 +170,7 @@ fn polish(camera: &Camera, picture: &RgbImage, people: &[PixelBox], pitch: &Pitc
         sigma[RADIAL] = 0.0;
     }
     let before = residual(camera, &samples, people, &map);
-    let mut moved = *camera;
-    // Twice: the points that are visible are chosen again once the camera is better.
-    for _ in 0..2 {
-        moved = fit(&Expectation { camera: moved, sigma }, &samples, people, &map);
-    }
+    let moved = sequence::onto_lines(camera, sigma, &samples, people, &map);
     let after = residual(&moved, &samples, people, &map);
     let better = after.1 >= sequence::LEAST_POINTS && after.0.zip(before.0).is_some_and(|(a, b)| a <= b);
     if better { moved } else { *camera }

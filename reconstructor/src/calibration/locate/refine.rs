@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use protocol::{camera::Camera, pitch::Pitch};
 
 use super::{
+    super::fit::geman_mcclure,
     super::least_squares::{
         LOG_FOCAL, Normal, PARAMETERS, POSITION, RADIAL, ROTATION, Row, minimise, project_with_derivatives,
     },
@@ -27,6 +28,9 @@ const BEHIND: (DVec3, DVec3) = (DVec3::new(-25.0, 16.0, 0.0), DVec3::new(45.0, 2
 const RADIAL_SIGMA: f64 = 0.15;
 const ROLL_SIGMA: f64 = 0.05;
 
+/// How much wider the priors are when they are left out; without any, few points leave the place open.
+const WITHOUT_PRIORS: f64 = 20.0;
+
 /// What the network can name, on a pitch of known size.
 pub(super) struct Named {
     /// In the order of [`super::names::points`].
@@ -39,7 +43,7 @@ pub(super) struct Named {
 impl Named {
     pub(super) fn new(pitch: &Pitch) -> Self {
         Self {
-            points: super::names::points(pitch).to_vec(),
+            points: super::names::points(pitch),
             lines: super::names::lines(pitch),
             half_length_m: pitch.length_m / 2.0,
         }
@@ -53,7 +57,7 @@ pub(crate) struct Terms {
     pub(crate) points: bool,
     /// Named lines, and the crossings of lines drawn on.
     pub(crate) lines: bool,
-    /// Where broadcast cameras usually stand.
+    /// Where broadcast cameras usually stand, level, with an ordinary lens; without, twenty times as wide.
     pub(crate) priors: bool,
     /// Radial distortion.
     pub(crate) radial: bool,
@@ -91,7 +95,7 @@ fn energy(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms, sca
                 continue;
             };
             let offset = pixel - point.pixel;
-            let bounded = robust(offset.length_squared(), scale_px);
+            let bounded = geman_mcclure(offset.length_squared(), scale_px);
             for (axis, row) in rows.iter().enumerate() {
                 normal.add(row, offset[axis], unit * bounded * bounded, 0.0);
             }
@@ -109,12 +113,12 @@ fn energy(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms, sca
                     normal.cost += unit * scale_px * scale_px;
                     continue;
                 };
-                let bounded = robust(residual * residual, scale_px);
+                let bounded = geman_mcclure(residual * residual, scale_px);
                 normal.add(&row, residual, unit * bounded * bounded, unit * residual * residual * bounded);
             }
         }
     }
-    let free = if terms.priors { 1.0 } else { 20.0 };
+    let free = if terms.priors { 1.0 } else { WITHOUT_PRIORS };
     let (usual, spread) = expected_place(camera, named);
     for axis in 0..3 {
         normal.expect(POSITION + axis, camera.position[axis] - usual[axis], spread[axis] * free);
@@ -126,12 +130,6 @@ fn energy(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms, sca
     // Keeps the focal length from running away while nothing is near.
     normal.expect(LOG_FOCAL, (camera.focal_px / width / 1.9).ln(), 1.0 * free);
     normal
-}
-
-/// Geman and McClure's weight: 1 at no distance, ½ at `scale_px`.
-fn robust(squared: f64, scale_px: f64) -> f64 {
-    let scale = scale_px * scale_px;
-    scale / (scale + squared)
 }
 
 fn expected_place(camera: &Camera, named: &Named) -> (DVec3, DVec3) {

@@ -10,8 +10,7 @@ use super::{
 fn evidence_of(camera: &Camera, named: &Named, noise_px: f64) -> Evidence {
     let wobble = |k: usize| DVec2::from_angle(k as f64 * 2.4) * noise_px;
     let seen = |world: DVec3| camera.project(world).filter(|&pixel| camera.contains(pixel));
-    let mut evidence =
-        Evidence { size_px: (camera.width_px, camera.height_px), pitch_share: 0.6, ..Evidence::default() };
+    let mut evidence = Evidence { size_px: (camera.width_px, camera.height_px), ..Evidence::default() };
     for (name, &world) in named.points.iter().enumerate() {
         if let Some(pixel) = seen(world) {
             evidence.points.push(FoundPoint { name, pixel: pixel + wobble(name), score: 0.7 });

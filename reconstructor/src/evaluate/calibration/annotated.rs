@@ -17,10 +17,10 @@ use serde::Deserialize;
 use super::{
     CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS, by_guess,
     figures::{FrameErrors, jac5, reprojection_errors_px, summary, turned},
-    locate_each, open_picture, parse, pitch_points, read,
+    locate_each, open_picture, parse, read,
 };
 use crate::{
-    calibration::{Calibration, Correspondence, calibrate_pictures},
+    calibration::{Calibration, Correspondence, calibrate_pictures, locate::pitch_points},
     report::Progress,
 };
 

@@ -5,6 +5,7 @@ use protocol::{camera::Camera, pitch::Pitch};
 use serde::Serialize;
 
 use super::STATED_WIDTH_PX;
+use crate::calibration::ShotFigures;
 
 /// Spacing of the grid on which the overlap of visible pitch areas is counted, metres.
 const AREA_GRID_M: f64 = 0.5;
@@ -14,7 +15,7 @@ const JAC_PX: f64 = 5.0;
 /// Figures of the calibration stage. What a folder has no truth for is absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CalibrationFigures {
-    /// How the cameras were found: `automatic`, or `four points given`.
+    /// How the cameras were found: `automatic`, or `points given`.
     pub mode: &'static str,
     /// Parts of the fit that were left out.
     pub without: Vec<String>,
@@ -57,7 +58,9 @@ pub struct CalibrationFigures {
     pub line_residual_median_px: Option<f64>,
     /// Frames by how sure the stage was and how often it was right to 1 % of the width: (lowest, highest confidence, frames, right).
     pub reliability: Vec<(f64, f64, usize, usize)>,
-    /// Processor time of a frame, seconds on one core; and the network's share of it.
+    /// How the cameras of a clip's shots came about.
+    pub shots: Vec<ShotFigures>,
+    /// Processor time of a frame, seconds on one core, of a clip with decoding it; and the network's share of a picture's.
     pub cpu_s_per_frame: Option<f64>,
     /// See `cpu_s_per_frame`.
     pub network_s_per_frame: Option<f64>,

@@ -42,7 +42,8 @@ pub(super) fn evaluate(
     let measured = locate_each(&pictures, options, progress, |(path, annotation), finder| {
         let picture = stretched(open_picture(path)?);
         let guess = finder.find(&picture, &pitch)?;
-        let homography = DMat3::from_cols_array_2d(&annotation.h_pitch_yards_to_1280x720).transpose();
+        let homography =
+            oriented(DMat3::from_cols_array_2d(&annotation.h_pitch_yards_to_1280x720).transpose());
         let frame = by_guess(guess.as_ref(), |camera| {
             let iou = camera.map(|camera| {
                 let shown = |place: DVec2| {
@@ -86,22 +87,21 @@ fn stretched(picture: RgbImage) -> RgbImage {
     imageops::resize(&frame, SIZE_PX.0, SIZE_PX.1, imageops::FilterType::CatmullRom)
 }
 
-/// Whether a place of the pitch (world x, z in metres) is in the picture by its homography.
+/// Whether a place of the pitch (world x, z in metres) is in the picture by its [`oriented`] homography.
 fn in_view(homography: &DMat3, place: DVec2, pitch: &Pitch) -> bool {
     let yards = (place + DVec2::new(pitch.length_m, pitch.width_m) / 2.0) / YARD_M;
     let at = *homography * yards.extend(1.0);
-    // The sign of the third coordinate is free: take it from the middle of what is seen.
     let pixel = at.truncate() / at.z;
     let size = DVec2::new(f64::from(SIZE_PX.0), f64::from(SIZE_PX.1));
-    let before = at.z * reference(homography).signum() > 0.0;
-    before && pixel.cmpge(DVec2::ZERO).all() && pixel.cmplt(size).all()
+    at.z > 0.0 && pixel.cmpge(DVec2::ZERO).all() && pixel.cmplt(size).all()
 }
 
-/// The third coordinate of the place that is seen at the lower middle of the picture, where pitch always is.
-fn reference(homography: &DMat3) -> f64 {
+/// The homography with the sign, which is free, that makes the third coordinate positive before the camera: at the lower middle
+/// of the picture, where pitch always is.
+fn oriented(homography: DMat3) -> DMat3 {
     let below = DVec3::new(f64::from(SIZE_PX.0) / 2.0, f64::from(SIZE_PX.1) * 0.9, 1.0);
     let yards = homography.inverse() * below;
-    (*homography * (yards / yards.z)).z
+    homography * (homography * (yards / yards.z)).z.signum()
 }
 
 #[cfg(test)]
@@ -129,7 +129,7 @@ mod tests {
             DVec3::new(-size.x / 2.0, -size.y / 2.0, 1.0),
         );
         for sign in [1.0, -1.0] {
-            let homography = from_metres * from_yards * sign;
+            let homography = oriented(from_metres * from_yards * sign);
             let shown = |place: DVec2| {
                 camera.project(DVec3::new(place.x, 0.0, place.y)).is_some_and(|pixel| camera.contains(pixel))
             };

@@ -14,15 +14,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::DVec3;
 use image::{ImageReader, RgbImage};
-use protocol::{
-    camera::Camera,
-    pitch::{
-        CIRCLE_RADIUS_M, GOAL_AREA_DEPTH_M, GOAL_AREA_WIDTH_M, GOAL_HEIGHT_M, GOAL_WIDTH_M,
-        PENALTY_AREA_DEPTH_M, PENALTY_AREA_WIDTH_M, PENALTY_MARK_M, Pitch,
-    },
-};
+use protocol::{camera::Camera, pitch::Pitch};
 use rayon::prelude::*;
 
 pub use annotated::{AnnotatedView, annotated_views};
@@ -54,7 +47,7 @@ pub enum Part {
     Lines,
     /// Radial distortion.
     K1,
-    /// Where broadcast cameras usually stand.
+    /// Where broadcast cameras usually stand, level, with an ordinary lens (made twenty times as wide).
     Priors,
     /// The last step onto the painted lines of the picture.
     Polish,
@@ -63,7 +56,8 @@ pub enum Part {
 /// How the stage is evaluated.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EvaluationOptions {
-    /// Give four annotated points of each picture, as a person would, instead of finding the camera without.
+    /// Give four annotated points of each picture (a clip's correspondences), as a person would, instead of finding the camera
+    /// without.
     pub clicks: bool,
     /// Leave these parts out.
     pub without: Vec<Part>,
@@ -121,7 +115,7 @@ pub fn evaluate(
     progress: &Progress,
 ) -> Result<CalibrationFigures, CalibrationEvaluationError> {
     let figures = if data.join("truth.json").is_file() {
-        rendered::clip(data, progress)?
+        rendered::clip(data, options, progress)?
     } else if data.join("frames.jsonl").is_file() {
         rendered::pictures(data, options, progress)?
     } else if data.join("pitch_points.json").is_file() {
@@ -131,7 +125,7 @@ pub fn evaluate(
     } else {
         return Err(CalibrationEvaluationError::NoTruth { path: data.into() });
     };
-    let mode = if options.clicks { "four points given" } else { "automatic" };
+    let mode = if options.clicks { "points given" } else { "automatic" };
     let without = options.without.iter().map(|part| format!("{part:?}").to_lowercase()).collect();
     Ok(CalibrationFigures { mode, without, ..figures })
 }
@@ -211,33 +205,6 @@ fn open_picture(path: &Path) -> Result<RgbImage, CalibrationEvaluationError> {
     Ok(reader.decode().map_err(|e| unreadable(e.to_string()))?.into_rgb8())
 }
 
-/// Points of a pitch that people annotate: corners, crossings, marks, posts and crossbar ends.
-fn pitch_points(pitch: &Pitch) -> Vec<DVec3> {
-    let (half_length, half_width) = (pitch.length_m / 2.0, pitch.width_m / 2.0);
-    let flat = |x: f64, z: f64| DVec3::new(x, 0.0, z);
-    let mut points = vec![DVec3::ZERO, flat(-CIRCLE_RADIUS_M, 0.0), flat(CIRCLE_RADIUS_M, 0.0)];
-    let arc_half_width = (CIRCLE_RADIUS_M.powi(2) - (PENALTY_AREA_DEPTH_M - PENALTY_MARK_M).powi(2)).sqrt();
-    for up in [-1.0, 1.0] {
-        points.push(flat(0.0, up * half_width));
-        points.push(flat(0.0, up * CIRCLE_RADIUS_M));
-        for side in [-1.0, 1.0] {
-            let goal_line = side * half_length;
-            points.push(flat(goal_line, up * half_width));
-            for (depth, width) in
-                [(PENALTY_AREA_DEPTH_M, PENALTY_AREA_WIDTH_M), (GOAL_AREA_DEPTH_M, GOAL_AREA_WIDTH_M)]
-            {
-                points.push(flat(goal_line, up * width / 2.0));
-                points.push(flat(goal_line - side * depth, up * width / 2.0));
-            }
-            points.push(flat(goal_line - side * PENALTY_AREA_DEPTH_M, up * arc_half_width));
-            points.push(flat(goal_line, up * GOAL_WIDTH_M / 2.0));
-            points.push(DVec3::new(goal_line, GOAL_HEIGHT_M, up * GOAL_WIDTH_M / 2.0));
-        }
-    }
-    points.extend([-1.0, 1.0].map(|side| flat(side * (half_length - PENALTY_MARK_M), 0.0)));
-    points
-}
-
 fn read(path: &Path) -> Result<String, CalibrationEvaluationError> {
     let failed = |reason: String| CalibrationEvaluationError::File { path: path.into(), reason };
     let file = std::fs::File::open(path).map_err(|e| failed(e.to_string()))?;
@@ -267,21 +234,7 @@ fn parse_lines<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Vec<T>, Ca
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec2;
-
     use super::*;
-
-    #[test]
-    fn every_annotated_point_lies_on_a_marking_or_the_goal() {
-        let pitch = Pitch::default();
-        let points = pitch_points(&pitch);
-        assert_eq!(points.len(), 41);
-        let marked: Vec<DVec2> = pitch.markings().iter().flat_map(|marking| marking.sample(0.02)).collect();
-        for point in points {
-            let near = marked.iter().any(|m| m.distance(DVec2::new(point.x, point.z)) < 0.03);
-            assert!(near && (point.y == 0.0 || point.y == GOAL_HEIGHT_M), "{point}");
-        }
-    }
 
     #[test]
     fn a_folder_without_truth_is_named() {

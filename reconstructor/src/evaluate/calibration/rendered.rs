@@ -4,17 +4,23 @@ use std::path::Path;
 
 use glam::{DVec2, DVec3};
 use protocol::{camera::Camera, pitch::Pitch};
-use serde::Deserialize;
+use serde::{Deserialize, de::IgnoredAny};
+use synthesis::shots::ShotKind;
 
 use super::{
     CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS, by_guess,
     figures::{FrameErrors, iou_part, jac5, reprojection_errors_px, summary, turned},
-    locate_each, open_picture, parse, parse_lines, pitch_points,
+    locate_each, open_picture, parse, parse_lines,
 };
 use crate::{
-    calibration::{Calibration, CalibrationError, calibrate},
+    calibration::{
+        Calibration, CalibrationError, ClipCameras, FindCamera, Finders, Known, calibrate, calibrate_shots,
+        locate::{Locator, pitch_points},
+    },
+    inference::InferenceError,
     ingest::Clip,
-    report::Progress,
+    report::{Progress, process_cpu_s},
+    shots,
 };
 
 /// Spacing of the pixels at which the error on the ground is taken, as a share of the picture's width.
@@ -28,31 +34,57 @@ struct Truth {
 #[derive(Deserialize)]
 struct TrueFrame {
     camera: Camera,
+    shot: ShotTruth,
 }
 
-/// A rendered clip with the correspondences that came with it.
+#[derive(Deserialize)]
+struct ShotTruth {
+    kind: ShotKind,
+    /// The other picture of a dissolve.
+    mixed_with: Option<IgnoredAny>,
+}
+
+/// A rendered clip: over its shots without help, or from the correspondences that came with it. Frames of dissolves do not count.
 pub(super) fn clip(
     data: &Path,
+    options: &EvaluationOptions,
     progress: &Progress,
 ) -> Result<CalibrationFigures, CalibrationEvaluationError> {
     let truth: Truth = parse(&data.join("truth.json"))?;
     let true_frames: Vec<TrueFrame> = parse_lines(&data.join("frames.jsonl"))?;
-    let given = Calibration::read(&data.join("correspondences.json"))?;
-    let clip = Clip::open(&data.join("clip.mp4"), None).map_err(CalibrationError::from)?;
-    let estimates = calibrate(&clip, &[], &given, progress)?;
+    let path = data.join("clip.mp4");
+    let started = process_cpu_s();
+    let cameras = if options.clicks {
+        let given = Calibration::read(&data.join("correspondences.json"))?;
+        let clip = Clip::open(&path, None).map_err(CalibrationError::from)?;
+        ClipCameras { frames: calibrate(&clip, &[], &given, progress)?, shots: Vec::new() }
+    } else {
+        let (clip, shots) = shots::open(&path, None).map_err(CalibrationError::from)?;
+        let load = || -> Result<Box<dyn FindCamera>, InferenceError> {
+            Ok(Box::new(Locator::load()?.with_terms(options.terms())))
+        };
+        let finders = Finders::new(&load);
+        let known = Known { pitch: truth.pitch, given: None, finders: Some(&finders) };
+        calibrate_shots(&clip, &[], &shots, &known, progress)?
+    };
+    let cpu_s = process_cpu_s() - started;
     let points = pitch_points(&truth.pitch);
     let frames: Vec<FrameErrors> = true_frames
         .iter()
-        .zip(&estimates)
+        .zip(&cameras.frames)
+        .filter(|(frame, _)| frame.shot.mixed_with.is_none())
         .filter_map(|(frame, estimate)| {
-            let seen = seen(&frame.camera, &points);
-            (seen.len() >= LEAST_POINTS).then(|| FrameErrors {
-                line_residual_px: estimate.line_residual_median_px,
-                ..errors(&frame.camera, estimate.camera.as_ref(), &truth.pitch, &seen)
-            })
+            let view =
+                View { camera: &frame.camera, kind: frame.shot.kind, pitch: &truth.pitch, points: &points };
+            let errors = view.errors(estimate.camera.as_ref())?;
+            Some(FrameErrors { line_residual_px: estimate.line_residual_median_px, ..errors })
         })
         .collect();
-    Ok(summary(&frames))
+    Ok(CalibrationFigures {
+        shots: cameras.shots,
+        cpu_s_per_frame: (cpu_s > 0.0).then(|| cpu_s / true_frames.len().max(1) as f64),
+        ..summary(&frames)
+    })
 }
 
 #[derive(Deserialize)]
@@ -63,11 +95,6 @@ struct PictureTruth {
     shot: ShotTruth,
 }
 
-#[derive(Deserialize)]
-struct ShotTruth {
-    kind: String,
-}
-
 /// Rendered pictures, each alone.
 pub(super) fn pictures(
     data: &Path,
@@ -76,26 +103,45 @@ pub(super) fn pictures(
 ) -> Result<CalibrationFigures, CalibrationEvaluationError> {
     let truths: Vec<PictureTruth> = parse_lines(&data.join("frames.jsonl"))?;
     let measured = locate_each(&truths, options, progress, |truth, finder| {
+        let points = pitch_points(&truth.pitch);
+        let view =
+            View { camera: &truth.camera, kind: truth.shot.kind, pitch: &truth.pitch, points: &points };
+        if view.errors(None).is_none() {
+            return Ok(None);
+        }
         let picture = open_picture(&data.join("images").join(&truth.name).with_extension("jpg"))?;
         let guess = finder.find(&picture, &truth.pitch)?;
-        let points = pitch_points(&truth.pitch);
-        let close_up = truth.shot.kind == "close-up";
-        let frame = by_guess(guess.as_ref(), |camera| {
-            if close_up {
-                return FrameErrors { false_camera: Some(camera.is_some()), ..FrameErrors::default() };
-            }
-            let of = |truth_camera: &Camera| {
-                errors(truth_camera, camera, &truth.pitch, &seen(truth_camera, &points))
-            };
-            let (straight, half_turned) = (of(&truth.camera), of(&turned(&truth.camera)));
-            let sum = |frame: &FrameErrors| frame.errors_px.iter().sum::<f64>();
-            let turned = sum(&half_turned) < sum(&straight);
-            FrameErrors { turned, ..if turned { half_turned } else { straight } }
-        });
+        let frame = by_guess(guess.as_ref(), |camera| view.errors(camera).unwrap_or_default());
         tracing::info!(picture = truth.name, right = ?frame.right, confidence = ?frame.confidence, "measured");
-        Ok((close_up || seen(&truth.camera, &points).len() >= LEAST_POINTS).then_some(frame))
+        Ok(Some(frame))
     })?;
     Ok(measured.figures())
+}
+
+/// What a rendered frame truly shows.
+struct View<'a> {
+    camera: &'a Camera,
+    kind: ShotKind,
+    pitch: &'a Pitch,
+    points: &'a [DVec3],
+}
+
+impl View<'_> {
+    /// Errors of a camera found for the frame, or of none; `None` when the frame shows too few points to count.
+    fn errors(&self, found: Option<&Camera>) -> Option<FrameErrors> {
+        if self.kind == ShotKind::CloseUp {
+            return Some(FrameErrors { false_camera: Some(found.is_some()), ..FrameErrors::default() });
+        }
+        if seen(self.camera, self.points).len() < LEAST_POINTS {
+            return None;
+        }
+        let of = |truth: &Camera| errors(truth, found, self.pitch, &seen(truth, self.points));
+        // Behind a goal nothing in the picture tells the two ends of the pitch apart: the better of both counts.
+        let (straight, half_turned) = (of(self.camera), of(&turned(self.camera)));
+        let sum = |frame: &FrameErrors| frame.errors_px.iter().sum::<f64>();
+        let turned = sum(&half_turned) < sum(&straight);
+        Some(FrameErrors { turned, ..if turned { half_turned } else { straight } })
+    }
 }
 
 /// Points inside the picture of a camera.
@@ -144,10 +190,7 @@ fn ground_errors_m(truth: &Camera, found: &Camera, pitch: &Pitch) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use synthesis::{
-        dataset::{FrameOptions, Split, broadcast_frames},
-        shots::ShotKind,
-    };
+    use synthesis::dataset::{FrameOptions, Split, broadcast_frames};
 
     use super::{super::evaluate, *};
 
