@@ -79,7 +79,7 @@ pub fn run(options: &CalibrateOptions, progress: &Progress) -> Result<Calibratio
     let given = options.calibration.as_deref().map(Given::read).transpose()?;
     let pitch = options.pitch.or(given.as_ref().and_then(Given::pitch)).unwrap_or_default();
     let finders = Finders::new(&shipped);
-    let known = Known { pitch, given: given.as_ref(), finders: Some(&finders) };
+    let known = Known { pitch, given: given.as_ref(), finders: Some(&finders), apart: false };
     let (frames, cameras, transitions) = match options.inputs.as_slice() {
         [] => return Err(CalibrationError::NoFrames),
         [clip] if !is_picture(clip) => {

@@ -31,7 +31,7 @@ const MOST_ALONG_PX: f64 = 6.0;
 pub(super) struct Expectation {
     /// The camera expected.
     pub(super) camera: Camera,
-    /// Standard deviation of each parameter about it; `f64::INFINITY` when nothing is known, 0 when it must not move.
+    /// Standard deviation of each parameter about it; 0 when it must not move.
     pub(super) sigma: Row,
 }
 
@@ -47,6 +47,26 @@ pub(super) struct Pull {
     pub(super) cost: f64,
 }
 
+impl Expectation {
+    /// How far a camera is from the one expected.
+    fn terms(&self, camera: &Camera) -> Normal {
+        let mut normal = Normal::new();
+        let turn = turn_between(&self.camera.rotation, &camera.rotation);
+        let travel = camera.position - self.camera.position;
+        let mut difference = [0.0; PARAMETERS];
+        difference[LOG_FOCAL] = (camera.focal_px / self.camera.focal_px).ln();
+        difference[ROTATION..ROTATION + 3].copy_from_slice(&turn.to_array());
+        difference[POSITION..POSITION + 3].copy_from_slice(&travel.to_array());
+        difference[RADIAL] = camera.k1 - self.camera.k1;
+        for (parameter, (&sigma, &off)) in self.sigma.iter().zip(&difference).enumerate() {
+            if sigma > 0.0 {
+                normal.expect(parameter, off, sigma);
+            }
+        }
+        normal
+    }
+}
+
 /// The camera of a frame near an expected one.
 pub(super) fn fit(
     expected: &Expectation,
@@ -54,41 +74,38 @@ pub(super) fn fit(
     people: &[PixelBox],
     map: &LineMap<'_>,
 ) -> Camera {
-    let shown = visible(&expected.camera, samples, people);
     let free = expected.sigma.map(|sigma| sigma > 0.0);
-    let picture_scale = f64::from(expected.camera.height_px) / 720.0;
-    SCALES_PX.iter().fold(expected.camera, |camera, scale| {
-        minimise(camera, free, 12, |candidate| {
-            energy(candidate, expected, &shown, map, scale * picture_scale)
-        })
-        .0
+    onto_lines(&expected.camera, free, samples, people, map, |camera| expected.terms(camera))
+}
+
+/// A camera moved onto the painted lines; `further` is what else is known of it, and only `free` parameters move.
+pub(super) fn onto_lines(
+    start: &Camera,
+    free: [bool; PARAMETERS],
+    samples: &[Sample],
+    people: &[PixelBox],
+    map: &LineMap<'_>,
+    further: impl Fn(&Camera) -> Normal,
+) -> Camera {
+    let shown = visible(start, samples, people);
+    let picture_scale = f64::from(start.height_px) / 720.0;
+    SCALES_PX.iter().fold(*start, |camera, scale| {
+        let energy = |candidate: &Camera| {
+            let mut normal = lines(candidate, &shown, map, scale * picture_scale);
+            normal.join(&further(candidate));
+            normal
+        };
+        minimise(camera, free, 12, energy).0
     })
 }
 
-fn energy(
-    camera: &Camera,
-    expected: &Expectation,
-    shown: &[Sample],
-    map: &LineMap<'_>,
-    scale_px: f64,
-) -> Normal {
+/// How far the points of the lines are from the painted lines.
+fn lines(camera: &Camera, shown: &[Sample], map: &LineMap<'_>, scale_px: f64) -> Normal {
     let mut normal = Normal::new();
     for sample in shown {
         match pull(camera, sample, map, scale_px) {
             Some(pull) => normal.add(&pull.row, pull.residual, pull.weight, pull.cost),
             None => normal.cost += no_match_cost(scale_px),
-        }
-    }
-    let turn = turn_between(&expected.camera.rotation, &camera.rotation);
-    let travel = camera.position - expected.camera.position;
-    let mut difference = [0.0; PARAMETERS];
-    difference[LOG_FOCAL] = (camera.focal_px / expected.camera.focal_px).ln();
-    difference[ROTATION..ROTATION + 3].copy_from_slice(&turn.to_array());
-    difference[POSITION..POSITION + 3].copy_from_slice(&travel.to_array());
-    difference[RADIAL] = camera.k1 - expected.camera.k1;
-    for (parameter, (&sigma, &off)) in expected.sigma.iter().zip(&difference).enumerate() {
-        if sigma > 0.0 && sigma.is_finite() {
-            normal.expect(parameter, off, sigma);
         }
     }
     normal

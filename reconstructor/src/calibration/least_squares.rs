@@ -98,6 +98,13 @@ impl Normal {
         self.cost += cost;
     }
 
+    /// Adds other terms of the same camera.
+    pub(super) fn join(&mut self, other: &Self) {
+        self.matrix += other.matrix;
+        self.gradient += other.gradient;
+        self.cost += other.cost;
+    }
+
     /// Adds a prior on one parameter: `difference` from where it is expected, `sigma` of that.
     pub(super) fn expect(&mut self, parameter: usize, difference: f64, sigma: f64) {
         let scaled = difference / sigma;

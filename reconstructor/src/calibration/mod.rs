@@ -110,6 +110,8 @@ pub struct Known<'a> {
     pub given: Option<&'a Given>,
     /// Who finds the camera of single frames in shots without given ones; nobody when `None`.
     pub finders: Option<&'a Finders<'a>>,
+    /// Leaves every frame a place and a lens of its own, to see what a common one is worth.
+    pub apart: bool,
 }
 
 /// The cameras of a clip.
@@ -146,7 +148,7 @@ pub fn calibrate(
     progress: &Progress,
 ) -> Result<Vec<CameraEstimate>, CalibrationError> {
     let given = Given::Points(first.clone());
-    let known = Known { pitch: first.pitch, given: Some(&given), finders: None };
+    let known = Known { pitch: first.pitch, given: Some(&given), finders: None, apart: false };
     let shots = ShotList::single(clip.info().frames.len());
     Ok(calibrate_shots(clip, people, &shots, &known, progress)?.frames)
 }
@@ -187,7 +189,7 @@ pub fn calibrate_pictures(
     first: &Calibration,
 ) -> Result<Vec<CameraEstimate>, CalibrationError> {
     let given = Given::Points(first.clone());
-    let known = Known { pitch: first.pitch, given: Some(&given), finders: None };
+    let known = Known { pitch: first.pitch, given: Some(&given), finders: None, apart: false };
     Ok(calibrate_images(&pictures, &known)?.frames)
 }
 
@@ -255,7 +257,7 @@ fn solve(
         for (shot, wanted) in all.iter_mut().zip(&wanted) {
             if shot.solution.is_none() || !wanted.is_empty() {
                 let part = frames.get(shot.frames.clone()).unwrap_or_default();
-                shot.solution = Some(shot::solve(part, &shot.anchors, &shot.refused, &samples));
+                shot.solution = Some(shot::solve(part, &shot.anchors, &shot.refused, &samples, known.apart));
             }
         }
     }

@@ -49,20 +49,11 @@ pub(super) const fn spread(log_focal: f64, turn: [f64; 3], position_m: f64, k1: 
 /// The first camera, moved onto the lines of its frame, with its estimate.
 pub(super) fn settle(first: &Camera, frame: &FrameLines, samples: &[Sample]) -> CameraEstimate {
     let map = frame.lines.map();
-    let camera = onto_lines(first, FIRST_SIGMA, samples, &frame.people, &map);
-    judge(&camera, frame, samples, &map)
-}
-
-/// A camera moved onto the lines of its picture, by about `sigma` at most.
-pub(super) fn onto_lines(
-    first: &Camera,
-    sigma: Row,
-    samples: &[Sample],
-    people: &[PixelBox],
-    map: &LineMap<'_>,
-) -> Camera {
     // Twice: the points that are visible are chosen again once the camera is better.
-    (0..2).fold(*first, |camera, _| fit(&Expectation { camera, sigma }, samples, people, map))
+    let camera = (0..2).fold(*first, |camera, _| {
+        fit(&Expectation { camera, sigma: FIRST_SIGMA }, samples, &frame.people, &map)
+    });
+    judge(&camera, frame, samples, &map)
 }
 
 /// The cameras of the frames around `start`, where the camera is known: as far as the lines can be followed in both

@@ -78,12 +78,14 @@ pub(super) struct Solution {
     pub(super) figures: ShotFigures,
 }
 
-/// Solves a shot from what is known of single frames. `refused` holds the frames in which no camera was found, with reasons.
+/// Solves a shot from what is known of single frames. `refused` holds the frames in which no camera was found, with reasons;
+/// `apart` leaves every frame its own place.
 pub(super) fn solve(
     frames: &[FrameLines],
     anchors: &[Anchor],
     refused: &[(usize, String)],
     samples: &[Sample],
+    apart: bool,
 ) -> Solution {
     let tried: Vec<usize> = refused.iter().map(|(index, _)| *index).collect();
     let chains = chains::find(frames, anchors, &tried, samples);
@@ -94,8 +96,8 @@ pub(super) fn solve(
         agreeing: chains.iter().map(|chain| chain.agreeing).sum(),
         ..ShotFigures::default()
     };
-    let mut estimates =
-        on_tripod(frames, &chains, samples, &mut figures).unwrap_or_else(|| alone(frames, &chains));
+    let together = if apart { None } else { on_tripod(frames, &chains, samples, &mut figures) };
+    let mut estimates = together.unwrap_or_else(|| alone(frames, &chains));
     let why = nothing_found(anchors, refused, &chains);
     for estimate in estimates.iter_mut().filter(|e| e.camera.is_none() && e.reason.is_none()) {
         estimate.reason = Some(why.clone());

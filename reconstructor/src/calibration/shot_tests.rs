@@ -64,7 +64,7 @@ fn solved(
 ) -> ClipCameras {
     let load = || -> Result<Box<dyn FindCamera>, InferenceError> { Ok(Box::new(ByNumber(find.clone()))) };
     let finders = Finders::new(&load);
-    let known = Known { pitch: Pitch::default(), given: None, finders: Some(&finders) };
+    let known = Known { pitch: Pitch::default(), given: None, finders: Some(&finders), apart: false };
     images(&pictures(cameras), shots, &known).unwrap()
 }
 
@@ -185,7 +185,8 @@ fn given_cameras_win_for_their_shot_and_are_told_apart_by_content() {
             Err(InferenceError::ModelNotFound { name: "none".into(), looked_at: Vec::new() })
         };
         let finders = Finders::new(&load);
-        let known = Known { pitch: Pitch::default(), given: Some(&given), finders: Some(&finders) };
+        let known =
+            Known { pitch: Pitch::default(), given: Some(&given), finders: Some(&finders), apart: false };
         let found = calibrate_images(&pictures, &known).unwrap();
         assert!(found.frames.iter().all(|e| e.camera.is_some() && e.confidence == Some(1.0)));
         let none = Known { given: None, ..known };

@@ -45,7 +45,7 @@ impl<'a> Run<'a> {
         let pitch = options.pitch.or(given.as_ref().and_then(Given::pitch)).unwrap_or_default();
         inference::initialize(None)?;
         let (clip, shots) = shots::open(&options.clip, options.frames.clone())?;
-        let known = Known { pitch, given: given.as_ref(), finders: None };
+        let known = Known { pitch, given: given.as_ref(), finders: None, apart: false };
         calibration::check_given(clip.info(), &known).map_err(|source| PipelineError::Correspondences {
             path: options.calibration.clone().unwrap_or_default(),
             source: Box::new(source),
@@ -173,7 +173,12 @@ impl<'a> Run<'a> {
             _ => {
                 let progress = self.reporter.progress(Stage::Calibration, self.frame_count());
                 let finders = Finders::new(&calibration::shipped);
-                let known = Known { pitch: self.pitch, given: self.given.as_ref(), finders: Some(&finders) };
+                let known = Known {
+                    pitch: self.pitch,
+                    given: self.given.as_ref(),
+                    finders: Some(&finders),
+                    apart: false,
+                };
                 let cameras =
                     calibration::calibrate_shots(&self.clip, detections, &self.shots, &known, &progress)?;
                 results.save(0, &cameras)?;

@@ -19,8 +19,8 @@ use image::RgbImage;
 use protocol::{camera::Camera, pitch::Pitch};
 
 use super::{
-    fit::residual,
-    least_squares::{RADIAL, Row},
+    fit::{onto_lines, residual},
+    least_squares::{Normal, PARAMETERS, RADIAL},
     lines::LinePixels,
     sequence, template,
 };
@@ -35,7 +35,7 @@ use hypotheses::Pair;
 pub(crate) use names::points as pitch_points;
 use readings::{End, before_goal};
 pub(crate) use refine::Terms;
-use refine::{Named, refine};
+use refine::{Named, beside_lines, refine};
 
 /// File name of the network in `assets/models`.
 pub(crate) const MODEL: &str = "pitch.onnx";
@@ -46,8 +46,6 @@ const PAIRS_MIN: usize = 3;
 pub(crate) const CONFIDENCE_MIN: f64 = 0.85;
 /// From this confidence on, other readings of the names are not tried.
 const CLEAR: f64 = 0.9;
-/// How far the painted lines may move the network's camera.
-const POLISH_SIGMA: Row = sequence::spread(0.06, [0.012, 0.012, 0.008], 4.0, 0.04);
 
 /// A camera found in a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,15 +105,16 @@ impl Locator {
         let evidence = evidence::find(&mut self.model, picture)?;
         self.network_s += thread_cpu_s() - started;
         let named = Named::new(pitch);
-        let mut best = self.read(&evidence, &named, pitch);
+        let mut reading = evidence;
+        let mut best = self.read(&reading, &named, pitch);
         // Names that fit together are not doubted.
         if !best.as_ref().is_ok_and(|located| located.confidence >= CLEAR) {
-            for end in [End::Left, End::Right] {
-                let other = self.read(&before_goal(&evidence, end), &named, pitch);
+            for other_reading in [End::Left, End::Right].map(|end| before_goal(&reading, end)) {
+                let other = self.read(&other_reading, &named, pitch);
                 let confidence =
                     |guess: &Result<Located, String>| guess.as_ref().map_or(0.0, |g| g.confidence);
                 if confidence(&other) > confidence(&best) {
-                    best = other;
+                    (best, reading) = (other, other_reading);
                 }
             }
         }
@@ -123,7 +122,9 @@ impl Locator {
             if !self.terms.polish {
                 return located;
             }
-            Located { camera: polish(&located.camera, picture, people, pitch, self.terms), ..located }
+            let further = |camera: &Camera| beside_lines(camera, &reading, &named, self.terms);
+            let camera = polish(&located.camera, picture, people, pitch, self.terms.radial, further);
+            Located { camera, ..located }
         }))
     }
 
@@ -161,16 +162,22 @@ fn explain(evidence: &Evidence, named: &Named, pitch: &Pitch, terms: Terms) -> R
 }
 
 /// The camera moved onto the painted lines of the picture, when these agree with it better there.
-fn polish(camera: &Camera, picture: &RgbImage, people: &[PixelBox], pitch: &Pitch, terms: Terms) -> Camera {
+fn polish(
+    camera: &Camera,
+    picture: &RgbImage,
+    people: &[PixelBox],
+    pitch: &Pitch,
+    radial: bool,
+    further: impl Fn(&Camera) -> Normal,
+) -> Camera {
     let lines = LinePixels::find(picture, people);
     let map = lines.map();
     let samples = template::samples(pitch);
-    let mut sigma = POLISH_SIGMA;
-    if !terms.radial {
-        sigma[RADIAL] = 0.0;
-    }
+    let mut free = [true; PARAMETERS];
+    free[RADIAL] = radial;
     let before = residual(camera, &samples, people, &map);
-    let moved = sequence::onto_lines(camera, sigma, &samples, people, &map);
+    // Twice: the points that are visible are chosen again once the camera is better.
+    let moved = (0..2).fold(*camera, |camera, _| onto_lines(&camera, free, &samples, people, &map, &further));
     let after = residual(&moved, &samples, people, &map);
     let better = after.1 >= sequence::LEAST_POINTS && after.0.zip(before.0).is_some_and(|(a, b)| a <= b);
     if better { moved } else { *camera }

@@ -18,8 +18,10 @@ const SCALES: [f64; 3] = [0.03, 0.012, 0.006];
 /// Error of a named point and of a cell of a line, as shares of the picture's width: a quarter of a cell of the network.
 const POINT_SIGMA: f64 = 0.002;
 const LINE_SIGMA: f64 = 0.0015;
-/// Neighbouring cells of a line share one error.
-const CELLS_PER_ERROR: f64 = 4.0;
+/// Error of a named point where the painted lines fix the camera to a pixel: what is left is of the network, not of the camera.
+const POINT_SIGMA_ON_LINES: f64 = 0.003;
+/// Cells of a line share one error: where the network is wrong about a line, it is wrong about a long stretch of it.
+const CELLS_PER_ERROR: f64 = 12.0;
 /// Main cameras: usual place and its spread, metres.
 const MAIN: (DVec3, DVec3) = (DVec3::new(0.0, 17.0, 60.0), DVec3::new(30.0, 20.0, 45.0));
 /// Cameras behind the goal: height, distance from the goal line and spread, metres.
@@ -75,49 +77,80 @@ impl Default for Terms {
 pub(super) fn refine(start: &Camera, evidence: &Evidence, named: &Named, terms: Terms) -> (Camera, f64) {
     let mut free = [true; PARAMETERS];
     free[RADIAL] = terms.radial;
-    let width = f64::from(start.width_px);
     let first = (*start, f64::INFINITY);
     SCALES.iter().fold(first, |(camera, _), scale| {
-        minimise(camera, free, 15, |candidate| energy(candidate, evidence, named, terms, scale * width))
+        minimise(camera, free, 15, |candidate| energy(candidate, evidence, named, terms, *scale))
     })
 }
 
-fn energy(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms, scale_px: f64) -> Normal {
+/// What holds a camera while it is moved onto the painted lines: named points, and where cameras stand. The lines that the
+/// network names are the painted ones, and not counted twice.
+pub(super) fn beside_lines(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms) -> Normal {
+    let mut normal = priors(camera, named, terms);
+    if terms.points {
+        let [.., finest] = SCALES;
+        normal.join(&points(camera, evidence, named, POINT_SIGMA_ON_LINES, finest));
+    }
+    normal
+}
+
+fn energy(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms, scale: f64) -> Normal {
+    let mut normal = priors(camera, named, terms);
+    if terms.points {
+        normal.join(&points(camera, evidence, named, POINT_SIGMA, scale));
+    }
+    if terms.lines {
+        normal.join(&lines(camera, evidence, named, scale));
+    }
+    normal
+}
+
+/// Distances of the named points; `sigma` and `scale` are shares of the picture's width.
+fn points(camera: &Camera, evidence: &Evidence, named: &Named, sigma: f64, scale: f64) -> Normal {
     let mut normal = Normal::new();
     let width = f64::from(camera.width_px);
-    if terms.points {
-        let unit = (POINT_SIGMA * width).powi(-2);
-        for point in &evidence.points {
-            let Some(&world) = named.points.get(point.name).filter(|world| world.y == 0.0) else { continue };
-            let unit = unit * point.score;
-            let Some((pixel, rows)) = project_with_derivatives(camera, world) else {
+    let (unit, scale_px) = ((sigma * width).powi(-2), scale * width);
+    for point in &evidence.points {
+        let Some(&world) = named.points.get(point.name).filter(|world| world.y == 0.0) else { continue };
+        let unit = unit * point.score;
+        let Some((pixel, rows)) = project_with_derivatives(camera, world) else {
+            normal.cost += unit * scale_px * scale_px;
+            continue;
+        };
+        let offset = pixel - point.pixel;
+        let bounded = geman_mcclure(offset.length_squared(), scale_px);
+        for (axis, row) in rows.iter().enumerate() {
+            normal.add(row, offset[axis], unit * bounded * bounded, 0.0);
+        }
+        normal.cost += unit * offset.length_squared() * bounded;
+    }
+    normal
+}
+
+/// Distances of the cells of named lines.
+fn lines(camera: &Camera, evidence: &Evidence, named: &Named, scale: f64) -> Normal {
+    let mut normal = Normal::new();
+    let width = f64::from(camera.width_px);
+    let (unit, scale_px) = ((LINE_SIGMA * width).powi(-2) / CELLS_PER_ERROR, scale * width);
+    for (name, cells) in by_name(&evidence.lines) {
+        let flat = named.lines.get(name).filter(|line| line.iter().all(|point| point.y == 0.0));
+        let Some(drawn) = flat.map(|line| draw(camera, line)) else { continue };
+        for cell in cells {
+            let unit = unit * cell.score;
+            let Some((row, residual)) = nearest(&drawn, cell.pixel) else {
                 normal.cost += unit * scale_px * scale_px;
                 continue;
             };
-            let offset = pixel - point.pixel;
-            let bounded = geman_mcclure(offset.length_squared(), scale_px);
-            for (axis, row) in rows.iter().enumerate() {
-                normal.add(row, offset[axis], unit * bounded * bounded, 0.0);
-            }
-            normal.cost += unit * offset.length_squared() * bounded;
+            let bounded = geman_mcclure(residual * residual, scale_px);
+            normal.add(&row, residual, unit * bounded * bounded, unit * residual * residual * bounded);
         }
     }
-    if terms.lines {
-        let unit = (LINE_SIGMA * width).powi(-2) / CELLS_PER_ERROR;
-        for (name, cells) in by_name(&evidence.lines) {
-            let flat = named.lines.get(name).filter(|line| line.iter().all(|point| point.y == 0.0));
-            let Some(drawn) = flat.map(|line| draw(camera, line)) else { continue };
-            for cell in cells {
-                let unit = unit * cell.score;
-                let Some((row, residual)) = nearest(&drawn, cell.pixel) else {
-                    normal.cost += unit * scale_px * scale_px;
-                    continue;
-                };
-                let bounded = geman_mcclure(residual * residual, scale_px);
-                normal.add(&row, residual, unit * bounded * bounded, unit * residual * residual * bounded);
-            }
-        }
-    }
+    normal
+}
+
+/// How far a camera is from where cameras stand, how they are held, and an ordinary lens.
+fn priors(camera: &Camera, named: &Named, terms: Terms) -> Normal {
+    let mut normal = Normal::new();
     let free = if terms.priors { 1.0 } else { WITHOUT_PRIORS };
     let (usual, spread) = expected_place(camera, named);
     for axis in 0..3 {
@@ -128,7 +161,7 @@ fn energy(camera: &Camera, evidence: &Evidence, named: &Named, terms: Terms, sca
     let (sideways, down) = (camera.rotation.row(0).y, -camera.rotation.row(1).y);
     normal.expect(ROTATION + 2, sideways / down.max(0.2), ROLL_SIGMA * free);
     // Keeps the focal length from running away while nothing is near.
-    normal.expect(LOG_FOCAL, (camera.focal_px / width / 1.9).ln(), 1.0 * free);
+    normal.expect(LOG_FOCAL, (camera.focal_px / f64::from(camera.width_px) / 1.9).ln(), free);
     normal
 }
 

@@ -216,7 +216,8 @@ fn label_points(
             let name = names.get(&index)?;
             // Their world: x along the touchline, y towards the main camera, z up.
             let [x, y, z] = name.xyz_m;
-            let pixel = DVec2::new(*point.first()?, *point.get(1)?) * size;
+            // YOLO counts from the picture's corner, we from the middle of the first pixel.
+            let pixel = DVec2::new(*point.first()?, *point.get(1)?) * size - 0.5;
             let inside = pixel.cmpge(DVec2::splat(-0.5)).all() && pixel.cmple(size - 0.5).all();
             inside.then(|| Correspondence { name: name.name.clone(), pixel, world_m: DVec3::new(x, z, y) })
         })

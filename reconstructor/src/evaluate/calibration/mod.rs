@@ -51,6 +51,8 @@ pub enum Part {
     Priors,
     /// The last step onto the painted lines of the picture.
     Polish,
+    /// One place and one lens for all frames of a shot.
+    Tripod,
 }
 
 /// How the stage is evaluated.
@@ -64,6 +66,10 @@ pub struct EvaluationOptions {
 }
 
 impl EvaluationOptions {
+    fn apart(&self) -> bool {
+        self.without.contains(&Part::Tripod)
+    }
+
     fn terms(&self) -> Terms {
         let with = |part| !self.without.contains(&part);
         Terms {

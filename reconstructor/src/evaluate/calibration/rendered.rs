@@ -64,7 +64,8 @@ pub(super) fn clip(
             Ok(Box::new(Locator::load()?.with_terms(options.terms())))
         };
         let finders = Finders::new(&load);
-        let known = Known { pitch: truth.pitch, given: None, finders: Some(&finders) };
+        let known =
+            Known { pitch: truth.pitch, given: None, finders: Some(&finders), apart: options.apart() };
         calibrate_shots(&clip, &[], &shots, &known, progress)?
     };
     let cpu_s = process_cpu_s() - started;
