@@ -5,6 +5,7 @@
 
 mod chains;
 pub mod command;
+mod dissolves;
 mod distance;
 mod error;
 mod find;
@@ -261,7 +262,9 @@ fn solve(
             }
         }
     }
-    Ok(together(frames.len(), shots, all))
+    let mut cameras = together(frames.len(), shots, all);
+    dissolves::follow(&mut cameras.frames, frames, shots, &samples);
+    Ok(cameras)
 }
 
 /// The estimates of all shots in one list; frames between shots say what they are.

@@ -145,6 +145,43 @@ fn every_shot_stands_alone_and_close_ups_have_reasons() {
 }
 
 #[test]
+fn the_stronger_picture_of_a_dissolve_is_followed() {
+    let first: Vec<Option<Camera>> = (0..22).map(|frame| Some(broadcast(frame))).collect();
+    let second: Vec<Option<Camera>> = (0..36).map(|frame| Some(broadcast(60 - frame))).collect();
+    let shots = ShotList {
+        shots: vec![Shot { frames: 0..16 }, Shot { frames: 22..36 }],
+        transitions: vec![Transition { frames: 16..22, kind: TransitionKind::Dissolve }],
+    };
+    let mut all = pictures(&second);
+    for (number, (a, b)) in pictures(&first).iter().zip(&mut all).enumerate() {
+        let share = ((number as f64 - 15.0) / 7.0).clamp(0.0, 1.0);
+        for (from, to) in a.iter().zip(b.iter_mut()) {
+            *to = (f64::from(*from) * (1.0 - share) + f64::from(*to) * share).round() as u8;
+        }
+        b.put_pixel(0, 0, Rgb([number as u8, 0, 0]));
+    }
+    let shown = |number: usize| if number < 19 { first[number] } else { second[number] };
+    let truth: Vec<Camera> = (0..36).filter_map(shown).collect();
+    let known = truth.clone();
+    let find = move |number: usize| Ok(roughly(&known[number], number));
+    let load = || -> Result<Box<dyn FindCamera>, InferenceError> { Ok(Box::new(ByNumber(find.clone()))) };
+    let finders = Finders::new(&load);
+    let known = Known { pitch: Pitch::default(), given: None, finders: Some(&finders), apart: false };
+    let found = images(&all, &shots, &known).unwrap();
+    let mut followed = 0;
+    for index in 16..22 {
+        let estimate = &found.frames[index];
+        assert!(estimate.reason.as_ref().unwrap().contains("dissolve"), "{estimate:?}");
+        let Some(camera) = estimate.camera else { continue };
+        followed += 1;
+        let error = median(&reprojection(&truth[index], &camera)).unwrap();
+        assert!(error < 1.5, "frame {index}: {error} px");
+    }
+    assert!(followed >= 4, "{followed} of 6");
+    assert_eq!(found.shots.iter().map(|shot| shot.solved).collect::<Vec<_>>(), [16, 14]);
+}
+
+#[test]
 fn a_camera_on_rails_is_flagged_and_followed() {
     let truth: Vec<Option<Camera>> = (0..40)
         .map(|frame| {

@@ -185,7 +185,12 @@ impl<'a> Run<'a> {
                 cameras
             }
         };
-        let cameras = cameras.frames;
+        let mut cameras = cameras.frames;
+        // The camera may be known in a dissolve, but people of two pictures would stand on one pitch.
+        for transition in &self.shots.transitions {
+            let mixed = cameras.get_mut(transition.frames.clone()).into_iter().flatten();
+            mixed.for_each(|estimate| *estimate = CameraEstimate::unsolved(transition.kind.name()));
+        }
         for (index, estimate) in cameras.iter().enumerate() {
             let (loss, reason) = match (&estimate.camera, &estimate.reason) {
                 (None, reason) => (Loss::LeftOut, reason.clone().unwrap_or_else(|| "no camera".to_owned())),

@@ -15,6 +15,9 @@ use super::{
 const OTHER_SCENE: f32 = 0.04;
 /// A cut stands out from the steps around it by this factor; a camera that is swept about makes many large steps.
 const STANDS_OUT: f32 = 3.0;
+/// Two views of mostly grass differ by less (0.037 was seen), but where the steps around are quiet that stands out all the more.
+const GRASS_TO_GRASS: f32 = 0.025;
+const STANDS_FAR_OUT: f32 = 8.0;
 /// Steps on each side that a cut is compared with.
 const NEIGHBOURS: usize = 3;
 /// Most steps of a dissolve: two seconds at 25 frames per second.
@@ -125,12 +128,12 @@ impl ShotDetector {
             let Some(before) = newest.checked_sub(length + 1).and_then(|at| self.thumbnails.get(at)) else {
                 return;
             };
-            if self.changes[begin] < OTHER_SCENE || self.changes[last] < OTHER_SCENE {
+            if self.changes[begin] < GRASS_TO_GRASS || self.changes[last] < GRASS_TO_GRASS {
                 continue;
             }
             let after = &self.thumbnails[newest];
             let motion = Motion::between(before, after);
-            if difference(before, after, &motion).is_some_and(|d| d < OTHER_SCENE) {
+            if difference(before, after, &motion).is_some_and(|d| d < GRASS_TO_GRASS) {
                 self.flashes[begin..=last].fill(true);
             }
         }
@@ -203,7 +206,7 @@ impl ShotDetector {
 
     fn is_cut(&self, frame: usize) -> bool {
         let change = self.changes[frame];
-        if change < OTHER_SCENE || self.flashes[frame] {
+        if change < GRASS_TO_GRASS || self.flashes[frame] {
             return false;
         }
         let low = frame.saturating_sub(NEIGHBOURS).max(1);
@@ -214,7 +217,8 @@ impl ShotDetector {
         around.sort_by(f32::total_cmp);
         // The second largest: a flash beside the cut does not hide it.
         around.pop();
-        around.last().is_none_or(|other| change >= STANDS_OUT * other)
+        let factor = if change >= OTHER_SCENE { STANDS_OUT } else { STANDS_FAR_OUT };
+        around.last().is_none_or(|other| change >= factor * other)
     }
 }
 
