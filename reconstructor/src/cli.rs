@@ -151,11 +151,26 @@ pub(crate) enum Evaluate {
         after_help = "Example:\n  reconstructor evaluate calibration --data assets/demo --json calibration.json"
     )]
     Calibration(EvaluateCalibration),
+    /// Share of the people on the pitch that are found in labelled pictures, and how much else is.
+    #[command(
+        after_help = "Example:\n  cargo xtask dataset frames-test --count 48\n  reconstructor evaluate detection --data target/datasets/frames-test --json detection.json"
+    )]
+    Detection(EvaluateDetection),
     /// How like real broadcasts rendered pictures are: both measured alike, worst measure first.
     #[command(
         after_help = "Example:\n  cargo xtask dataset frames-test --count 48\n  reconstructor evaluate realism --real ../shared/data/detection/dfl --ours target/datasets/frames-test --json realism.json"
     )]
     Realism(EvaluateRealism),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateDetection {
+    /// Labelled pictures: `images/` and `labels/` in the YOLO form (classes ball, goalkeeper, player, referee).
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
 }
 
 #[derive(Debug, Args)]

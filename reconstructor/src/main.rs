@@ -76,6 +76,12 @@ fn run(command: Command) -> Result<()> {
             drop(progress);
             write_figures(&arguments.json, &figures)
         }
+        Command::Evaluate(Evaluate::Detection(arguments)) => {
+            let progress = Progress::new("detection", 0);
+            let figures = evaluate::detection::evaluate(&arguments.data, &progress)?;
+            drop(progress);
+            write_figures(&arguments.json, &figures)
+        }
         Command::Evaluate(Evaluate::Realism(arguments)) => run_evaluate_realism(&arguments),
         Command::Serve(arguments) => Ok(serve(&arguments.stream, arguments.listen)?),
     }

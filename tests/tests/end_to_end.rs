@@ -41,7 +41,7 @@ fn run(out: &Path, work: &Path) -> ReconstructReport {
     let options = ReconstructOptions {
         clip: demo("clip.mp4"),
         out: out.to_owned(),
-        calibration: Some(demo("correspondences.json")),
+        calibration: None,
         pitch: None,
         frames: Some(FRAMES),
         work: Some(work.to_owned()),

@@ -69,6 +69,5 @@ pub(crate) fn run(no_window: bool) -> Result<()> {
 
 /// Reconstructs the shipped clip into a folder; the reconstructor is built.
 pub(crate) fn reconstruct(out: &str, more: &[&str]) -> Result<()> {
-    let clip = ["reconstruct", "assets/demo/clip.mp4", "--calibration", "assets/demo/correspondences.json"];
-    built("reconstructor", &[&clip[..], &["--out", out], more].concat())
+    built("reconstructor", &[&["reconstruct", "assets/demo/clip.mp4", "--out", out], more].concat())
 }

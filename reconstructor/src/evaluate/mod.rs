@@ -3,6 +3,8 @@
 
 pub mod calibration;
 pub mod depth;
+pub mod detection;
+pub mod labelled;
 pub mod matches;
 pub mod npy;
 pub mod planes;

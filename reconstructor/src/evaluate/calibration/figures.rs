@@ -58,6 +58,8 @@ pub struct CalibrationFigures {
     pub line_residual_median_px: Option<f64>,
     /// Frames by how sure the stage was and how often it was right to 1 % of the width: (lowest, highest confidence, frames, right).
     pub reliability: Vec<(f64, f64, usize, usize)>,
+    /// What `reliability` counts: the confidence of every best guess, sure enough or not, and whether it was right.
+    pub guesses: Vec<(f64, bool)>,
     /// How the cameras of a clip's shots came about.
     pub shots: Vec<ShotFigures>,
     /// Processor time of a frame, seconds on one core, of a clip with decoding it; and the network's share of a picture's.
@@ -138,6 +140,7 @@ pub(super) fn summary(frames: &[FrameErrors]) -> CalibrationFigures {
         ground_error_median_m: at(&all(&|frame| frame.ground_m.clone()), 0.5),
         line_residual_median_px: at(&all(&|frame| frame.line_residual_px.into_iter().collect()), 0.5),
         reliability: reliability(frames),
+        guesses: frames.iter().filter_map(|frame| frame.confidence.zip(frame.right)).collect(),
         ..CalibrationFigures::default()
     }
 }

@@ -35,7 +35,7 @@ pub(super) fn look(pictures: &[LabelledPicture], progress: &Progress) -> Result<
     let mut detector = Detector::load()?;
     let mut poses = PoseEstimator::load()?;
     let (mut found, mut people, mut scores) = (0, 0, Vec::new());
-    for LabelledPicture { picture, people: labels } in pictures {
+    for LabelledPicture { picture, people: labels, .. } in pictures {
         people += labels.len();
         found += matched(&mut detector, picture, labels)?;
         let step = labels.len().div_ceil(POSES_PER_PICTURE).max(1);

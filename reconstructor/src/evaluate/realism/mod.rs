@@ -3,20 +3,20 @@
 //! What training pictures cannot show, a network does not learn; so the worst line of this table says what to render better.
 //! The detector and the pose network have never seen a rendered picture: that they do as well on ours is a measure, too.
 
-mod labelled;
 mod looks;
 mod sheet;
 mod statistics;
 mod surroundings;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::labelled::{self, LabelError};
 use crate::{detection::DetectionError, pose::PoseError, report::Progress};
 
-pub use labelled::{LabelledPicture, SIZE_PX};
+pub use super::labelled::{LabelledPicture, SIZE_PX};
 pub use sheet::{SheetError, sheet};
 
 /// Figures of one measure over all pictures, or over all people of all pictures.
@@ -80,14 +80,9 @@ pub struct RealismFigures {
 /// Why realism could not be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum RealismError {
-    /// A folder or file could not be read.
-    #[error("cannot read {}: {reason}", path.display())]
-    File {
-        /// Which.
-        path: PathBuf,
-        /// Why, and what to do.
-        reason: String,
-    },
+    /// The labelled pictures could not be read.
+    #[error(transparent)]
+    Labels(#[from] LabelError),
     /// The detector failed.
     #[error(transparent)]
     Detection(#[from] DetectionError),

@@ -13,7 +13,7 @@ use crate::{geometry::PixelBox, report::median};
 /// of people or lines.
 pub(super) type Measured = [(&'static str, Vec<f64>); 16];
 
-pub(super) fn measure(LabelledPicture { picture, people }: &LabelledPicture) -> Measured {
+pub(super) fn measure(LabelledPicture { picture, people, .. }: &LabelledPicture) -> Measured {
     let planes = Planes::new(picture);
     let grass = Grass::of(picture, &planes);
     let of_grass = |channel: usize| grass.colour.iter().map(|colour| colour[channel]).collect();
@@ -212,7 +212,7 @@ mod tests {
             })
         });
         let people = vec![PixelBox { min: DVec2::new(199.5, 299.5), max: DVec2::new(229.5, 379.5) }];
-        LabelledPicture { picture, people }
+        LabelledPicture { picture, people, balls: Vec::new() }
     }
 
     fn named<'a>(found: &'a Measured, name: &str) -> &'a [f64] {

@@ -7,7 +7,6 @@ use glam::DVec2;
 use image::{ImageReader, RgbImage, imageops};
 use rayon::prelude::*;
 
-use super::RealismError;
 use crate::geometry::PixelBox;
 
 /// Every picture is brought to this size: sets of real pictures are often stretched to squares.
@@ -17,21 +16,33 @@ const BALL: u32 = 0;
 /// More boxes than any picture of a match has.
 const BOXES_MAX: usize = 1000;
 
-/// A picture with the boxes of its people.
+/// A picture with the boxes of its people and its ball.
 #[derive(Clone, Debug)]
 pub struct LabelledPicture {
     /// The picture, [`SIZE_PX`].
     pub picture: RgbImage,
     /// Boxes of the people on the pitch, pixels of `picture`.
     pub people: Vec<PixelBox>,
+    /// Boxes of balls, pixels of `picture`.
+    pub balls: Vec<PixelBox>,
+}
+
+/// A folder or file of labelled pictures could not be read.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot read {}: {reason}", path.display())]
+pub struct LabelError {
+    /// Which.
+    pub path: PathBuf,
+    /// Why, and what to do.
+    pub reason: String,
 }
 
 /// Reads every labelled picture of a folder (or of its subfolder `valid`), in the order of their names.
-pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, RealismError> {
+pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, LabelError> {
     let inner = folder.join("valid");
     let folder = if inner.join("labels").is_dir() { inner } else { folder.to_owned() };
     let labels = folder.join("labels");
-    let failed = |path: &Path, reason: String| RealismError::File { path: path.into(), reason };
+    let failed = |path: &Path, reason: String| LabelError { path: path.into(), reason };
     let entries = std::fs::read_dir(&labels).map_err(|error| {
         failed(&labels, format!("{error}; a set of labelled pictures has the folders images/ and labels/"))
     })?;
@@ -45,7 +56,7 @@ pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, RealismError> 
         .par_iter()
         .map(|label| {
             let text = std::fs::read_to_string(label).map_err(|error| failed(label, error.to_string()))?;
-            let people = boxes(&text).map_err(|reason| failed(label, reason))?;
+            let (people, balls) = boxes(&text).map_err(|reason| failed(label, reason))?;
             let stem = folder.join("images").join(label.file_stem().unwrap_or_default());
             // Names of files may have further dots: the ending is put behind, not instead.
             let named = |ending: &str| {
@@ -62,33 +73,32 @@ pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, RealismError> 
             } else {
                 imageops::resize(&picture, SIZE_PX.0, SIZE_PX.1, imageops::FilterType::CatmullRom)
             };
-            Ok(LabelledPicture { picture, people })
+            Ok(LabelledPicture { picture, people, balls })
         })
         .collect()
 }
 
-/// The boxes of the people of one label file.
-fn boxes(text: &str) -> Result<Vec<PixelBox>, String> {
+/// The boxes of the people and of the balls of one label file.
+fn boxes(text: &str) -> Result<(Vec<PixelBox>, Vec<PixelBox>), String> {
     let size = DVec2::new(f64::from(SIZE_PX.0), f64::from(SIZE_PX.1));
-    let mut people = Vec::new();
+    let (mut people, mut balls) = (Vec::new(), Vec::new());
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let wrong = || format!("line {}: expected `class x y width height`, found `{line}`", index + 1);
         let mut words = line.split_whitespace();
         let class: u32 = words.next().and_then(|word| word.parse().ok()).ok_or_else(wrong)?;
         let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
         let [x, y, width, height] = numbers[..] else { return Err(wrong()) };
-        if people.len() == BOXES_MAX {
+        if people.len() + balls.len() == BOXES_MAX {
             return Err(format!("more than {BOXES_MAX} boxes"));
         }
-        if class != BALL {
-            let (middle, half) = (DVec2::new(x, y) * size - 0.5, DVec2::new(width, height) * size / 2.0);
-            if !(middle.is_finite() && half.is_finite() && half.min_element() > 0.0) {
-                return Err(wrong());
-            }
-            people.push(PixelBox { min: middle - half, max: middle + half });
+        let (middle, half) = (DVec2::new(x, y) * size - 0.5, DVec2::new(width, height) * size / 2.0);
+        if !(middle.is_finite() && half.is_finite() && half.min_element() > 0.0) {
+            return Err(wrong());
         }
+        let kind = if class == BALL { &mut balls } else { &mut people };
+        kind.push(PixelBox { min: middle - half, max: middle + half });
     }
-    Ok(people)
+    Ok((people, balls))
 }
 
 #[cfg(test)]
@@ -97,8 +107,9 @@ mod tests {
 
     #[test]
     fn boxes_are_read_and_nonsense_is_named() {
-        let people = boxes("0 0.5 0.5 0.01 0.02\n2 0.5 0.25 0.1 0.2\n\n").unwrap();
+        let (people, balls) = boxes("0 0.5 0.5 0.01 0.02\n2 0.5 0.25 0.1 0.2\n\n").unwrap();
         assert_eq!(people, vec![PixelBox { min: DVec2::new(575.5, 107.5), max: DVec2::new(703.5, 251.5) }]);
+        assert_eq!(balls.len(), 1);
         for text in ["2 0.5 0.5 0.1", "x 1 1 1 1", "2 0.5 nan 0.1 0.1", "2 0.5 0.5 -0.1 0.1"] {
             assert!(boxes(text).unwrap_err().contains("line 1"), "{text}");
         }

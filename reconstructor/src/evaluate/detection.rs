@@ -1,0 +1,257 @@
+//! How many of the people on the pitch are found, and how much else (DESIGN section 6): by the detector alone, and by what the
+//! product makes of it, where the camera and the pose decide who stands on the pitch.
+
+use std::path::Path;
+
+use image::RgbImage;
+use protocol::pitch::Pitch;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::labelled::{self, LabelError, LabelledPicture};
+use crate::{
+    calibration::{self, FindCamera},
+    detection::{DetectionError, Detector},
+    geometry::PixelBox,
+    inference::InferenceError,
+    pose::{PoseError, PoseEstimator},
+    report::{Progress, thread_cpu_s},
+};
+
+/// Overlap (intersection over union) at which a box counts as found.
+const IOU_MIN: f64 = 0.5;
+
+/// Figures of finding people.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct DetectionFigures {
+    /// Pictures.
+    pub pictures: usize,
+    /// Of these, pictures whose camera was found; in the others nobody counts as standing on the pitch.
+    pub cameras: usize,
+    /// Labelled people.
+    pub people: usize,
+    /// Share of them that have a box of their own.
+    pub people_recall: f64,
+    /// Share of the boxes that are of a labelled person.
+    pub people_precision: f64,
+    /// Area under precision over recall, boxes by confidence.
+    pub people_average_precision: f64,
+    /// The same before camera and pose decide who is on the pitch.
+    pub detector_recall: f64,
+    /// See `detector_recall`.
+    pub detector_precision: f64,
+    /// See `detector_recall`.
+    pub detector_average_precision: f64,
+    /// Labelled balls; nothing finds them yet.
+    pub balls: usize,
+    /// Processor time of a picture, seconds on one core: detector; camera; pose.
+    pub cpu_s_per_picture: [f64; 3],
+}
+
+/// Why finding people could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum DetectionEvaluationError {
+    /// The labelled pictures could not be read.
+    #[error(transparent)]
+    Labels(#[from] LabelError),
+    /// The detector failed.
+    #[error(transparent)]
+    Detection(#[from] DetectionError),
+    /// The network that finds cameras failed.
+    #[error(transparent)]
+    Camera(#[from] InferenceError),
+    /// The pose network failed.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+}
+
+/// Finds people in labelled pictures (`images/` and `labels/` in the YOLO form), each alone, and holds them against the labels.
+///
+/// # Errors
+/// When the folder holds no labelled pictures or a network cannot run.
+pub fn evaluate(data: &Path, progress: &Progress) -> Result<DetectionFigures, DetectionEvaluationError> {
+    let pictures = labelled::read(data)?;
+    let share = pictures.len().div_ceil(rayon::current_num_threads()).max(1);
+    let parts: Vec<Vec<Found>> = pictures
+        .par_chunks(share)
+        .map(|pictures| {
+            let mut finder = Finder::load()?;
+            pictures
+                .iter()
+                .map(|picture| {
+                    let found = finder.find(&picture.picture);
+                    progress.advance(1);
+                    found
+                })
+                .collect()
+        })
+        .collect::<Result<_, DetectionEvaluationError>>()?;
+    let found: Vec<Found> = parts.into_iter().flatten().collect();
+    Ok(figures(&pictures, &found))
+}
+
+/// A box and how sure it is.
+type Scored = (PixelBox, f64);
+
+/// What was found in one picture.
+struct Found {
+    detections: Vec<Scored>,
+    people: Vec<Scored>,
+    camera: bool,
+    cpu_s: [f64; 3],
+}
+
+struct Finder {
+    detector: Detector,
+    camera: Box<dyn FindCamera>,
+    poses: PoseEstimator,
+}
+
+impl Finder {
+    fn load() -> Result<Self, DetectionEvaluationError> {
+        Ok(Self {
+            detector: Detector::load()?,
+            camera: calibration::shipped()?,
+            poses: PoseEstimator::load()?,
+        })
+    }
+
+    /// As the product does it, but for the frames around.
+    fn find(&mut self, picture: &RgbImage) -> Result<Found, DetectionEvaluationError> {
+        let pitch = Pitch::default();
+        let mut clock = thread_cpu_s();
+        let mut lap = || {
+            let (before, now) = (clock, thread_cpu_s());
+            clock = now;
+            now - before
+        };
+        let detections = self.detector.detect(picture)?;
+        let detector_s = lap();
+        let boxes: Vec<PixelBox> = detections.iter().map(|detection| detection.bounds).collect();
+        let camera = self.camera.find(picture, &boxes, &pitch)?.ok().filter(|found| found.is_sure());
+        let camera_s = lap();
+        let people = match &camera {
+            Some(found) => self.poses.people(picture, &detections, &found.camera, &pitch)?,
+            None => Vec::new(),
+        };
+        let pose_s = lap();
+        Ok(Found {
+            detections: detections.iter().map(|found| (found.bounds, f64::from(found.score))).collect(),
+            people: people.iter().map(|p| (p.bounds, f64::from(p.score * p.pose_score))).collect(),
+            camera: camera.is_some(),
+            cpu_s: [detector_s, camera_s, pose_s],
+        })
+    }
+}
+
+fn figures(pictures: &[LabelledPicture], found: &[Found]) -> DetectionFigures {
+    let labels: Vec<&[PixelBox]> = pictures.iter().map(|picture| picture.people.as_slice()).collect();
+    let of =
+        |boxes: &dyn Fn(&Found) -> Vec<Scored>| rate(&labels, &found.iter().map(boxes).collect::<Vec<_>>());
+    let (detector, people) = (of(&|found| found.detections.clone()), of(&|found| found.people.clone()));
+    let count = found.len().max(1) as f64;
+    DetectionFigures {
+        pictures: pictures.len(),
+        cameras: found.iter().filter(|found| found.camera).count(),
+        people: labels.iter().map(|labels| labels.len()).sum(),
+        people_recall: people.recall,
+        people_precision: people.precision,
+        people_average_precision: people.average_precision,
+        detector_recall: detector.recall,
+        detector_precision: detector.precision,
+        detector_average_precision: detector.average_precision,
+        balls: pictures.iter().map(|picture| picture.balls.len()).sum(),
+        cpu_s_per_picture: [0, 1, 2].map(|k| found.iter().map(|f| f.cpu_s[k]).sum::<f64>() / count),
+    }
+}
+
+/// Recall, precision and average precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rates {
+    recall: f64,
+    precision: f64,
+    average_precision: f64,
+}
+
+/// Boxes against labels, picture by picture: the surest box first takes the free label that it overlaps most.
+fn rate(labels: &[&[PixelBox]], boxes: &[Vec<Scored>]) -> Rates {
+    let mut decided: Vec<(f64, bool)> = Vec::new();
+    for (labels, boxes) in labels.iter().zip(boxes) {
+        let mut boxes = boxes.clone();
+        boxes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut free = vec![true; labels.len()];
+        for (bounds, score) in boxes {
+            let best = labels
+                .iter()
+                .enumerate()
+                .filter(|(index, _)| free.get(*index) == Some(&true))
+                .map(|(index, label)| (index, label.iou(&bounds)))
+                .filter(|(_, overlap)| *overlap >= IOU_MIN)
+                .max_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some(place) = best.and_then(|(index, _)| free.get_mut(index)) {
+                *place = false;
+            }
+            decided.push((score, best.is_some()));
+        }
+    }
+    let people: usize = labels.iter().map(|labels| labels.len()).sum();
+    let right = decided.iter().filter(|(_, right)| *right).count();
+    decided.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Rates {
+        recall: right as f64 / people.max(1) as f64,
+        precision: right as f64 / decided.len().max(1) as f64,
+        average_precision: average_precision(&decided, people),
+    }
+}
+
+/// Area under the precision that can be had at each recall or better (all points, as PASCAL VOC since 2010); surest first.
+fn average_precision(decided: &[(f64, bool)], people: usize) -> f64 {
+    let mut right = 0;
+    let mut precisions: Vec<f64> = Vec::new();
+    for (count, (_, is_right)) in decided.iter().enumerate() {
+        if *is_right {
+            right += 1;
+            precisions.push(f64::from(right) / (count + 1) as f64);
+        }
+    }
+    let mut best = 0.0_f64;
+    let mut sum = 0.0;
+    for precision in precisions.iter().rev() {
+        best = best.max(*precision);
+        sum += best;
+    }
+    sum / people.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    fn at(x: f64) -> PixelBox {
+        PixelBox { min: DVec2::new(x, 0.0), max: DVec2::new(x + 10.0, 20.0) }
+    }
+
+    #[test]
+    fn every_label_is_found_once_and_the_rest_is_wrong() {
+        let labels = [at(0.0), at(100.0)];
+        // Two boxes on one label, one beside everything; the second picture is empty.
+        let boxes = vec![vec![(at(1.0), 0.9), (at(0.0), 0.8), (at(50.0), 0.7)], Vec::new()];
+        let rates = rate(&[&labels, &[]], &boxes);
+        assert_eq!((rates.recall, rates.precision), (0.5, 1.0 / 3.0));
+        assert_eq!(rates.average_precision, 0.5);
+        assert_eq!(
+            rate(&[&labels], &[Vec::new()]),
+            Rates { recall: 0.0, precision: 0.0, average_precision: 0.0 }
+        );
+    }
+
+    #[test]
+    fn average_precision_takes_the_best_precision_at_each_recall_or_better() {
+        // Right, wrong, right: precision 1 at a recall of ½, ⅔ at 1.
+        let decided = [(0.9, true), (0.8, false), (0.7, true)];
+        assert!((average_precision(&decided, 2) - (1.0 + 2.0 / 3.0) / 2.0).abs() < 1e-12);
+        assert_eq!(average_precision(&[(0.9, false), (0.8, true)], 1), 0.5);
+    }
+}
