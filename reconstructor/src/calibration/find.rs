@@ -32,7 +32,7 @@ pub trait FindCamera: Send {
 pub type LoadFinder<'a> = dyn Fn() -> Result<Box<dyn FindCamera>, InferenceError> + Sync + 'a;
 
 /// A guess below this confidence is worse than none.
-const LEAST_CONFIDENCE: f64 = 0.1;
+const LEAST_CONFIDENCE: f64 = 0.05;
 
 impl FindCamera for Locator {
     /// Also cameras that it is not sure of alone: several frames of a shot that agree are sure together.

@@ -15,6 +15,9 @@ const LENGTH_MIN: f64 = 0.06;
 /// Places nearer to the edge than this share of the width need not be seen.
 const MARGIN: f64 = 0.015;
 
+/// Slope and offset of the agreement's logit: what `training/pitch/confidence.py` printed.
+const CALIBRATED: (f64, f64) = (1.072, -2.967);
+
 /// How evidence and camera agree, shares 0..1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Agreement {
@@ -52,11 +55,13 @@ impl Agreement {
         Self { explained, seen: seen(camera, evidence, named), support }
     }
 
-    /// The shares as one score 0..1: a logistic function whose weights were set by hand, so no probability. The evaluation's
-    /// reliability table says how often a score was right.
+    /// Probability that the camera is right: that nine of ten points of the pitch are within 2 % of the picture's width. A
+    /// logistic function of the shares with weights set by hand, its slope and offset fitted to spoiled rendered pictures of
+    /// matches that no network was trained on (`training/pitch/confidence.py`). Real pictures are harder; the evaluation's
+    /// reliability table says by how much.
     pub(super) fn confidence(&self) -> f64 {
-        let logit = 8.0 * (self.explained - 0.6) + 6.0 * (self.seen - 0.45) + 0.25 * (self.support - 6.0);
-        1.0 / (1.0 + (-logit).exp())
+        let agreement = 8.0 * (self.explained - 0.6) + 6.0 * (self.seen - 0.45) + 0.25 * (self.support - 6.0);
+        1.0 / (1.0 + (-(CALIBRATED.0 * agreement + CALIBRATED.1)).exp())
     }
 }
 

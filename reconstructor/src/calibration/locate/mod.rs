@@ -42,8 +42,8 @@ pub(crate) const MODEL: &str = "pitch.onnx";
 
 /// Fewer named points and crossings than this fix no camera.
 const PAIRS_MIN: usize = 3;
-/// A camera that nothing else speaks for needs this confidence.
-pub(crate) const CONFIDENCE_MIN: f64 = 0.85;
+/// A camera that nothing else speaks for must be more likely right than not.
+pub(crate) const CONFIDENCE_MIN: f64 = 0.5;
 /// From this confidence on, other readings of the names are not tried.
 const CLEAR: f64 = 0.9;
 
@@ -52,7 +52,7 @@ const CLEAR: f64 = 0.9;
 pub struct Located {
     /// The camera.
     pub camera: Camera,
-    /// How sure, 0..1: a score of how far the camera and what was named agree, no probability.
+    /// Probability that it is right, 0..1, as far as rendered pictures can tell: see `docs/calibration.md` for real ones.
     pub confidence: f64,
 }
 

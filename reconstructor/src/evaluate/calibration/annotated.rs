@@ -16,7 +16,7 @@ use serde::Deserialize;
 
 use super::{
     CalibrationEvaluationError, CalibrationFigures, EvaluationOptions, LEAST_POINTS, by_guess,
-    figures::{FrameErrors, jac5, reprojection_errors_px, summary, turned},
+    figures::{FALSE_PX, FrameErrors, jac5, reprojection_errors_px, summary, turned},
     locate_each, open_picture, parse, read,
 };
 use crate::{
@@ -32,8 +32,6 @@ struct NamedPoint {
 
 /// A frame with fewer annotated points on the ground shows no pitch as a whole.
 const PITCH_POINTS: usize = 3;
-/// A camera of such a frame is false when it puts an annotated point farther than this from its place, pixels at 960×540.
-const FALSE_PX: f64 = 20.0;
 
 pub(super) fn evaluate(
     data: &Path,

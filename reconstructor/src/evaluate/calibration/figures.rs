@@ -9,6 +9,8 @@ use crate::calibration::ShotFigures;
 
 /// Spacing of the grid on which the overlap of visible pitch areas is counted, metres.
 const AREA_GRID_M: f64 = 0.5;
+/// A camera that puts a point farther than this from its place is false there, pixels at 960×540.
+pub(super) const FALSE_PX: f64 = 20.0;
 /// SoccerNet's distance within which a point counts as right, pixels at 960×540.
 const JAC_PX: f64 = 5.0;
 
@@ -56,7 +58,7 @@ pub struct CalibrationFigures {
     pub ground_error_median_m: Option<f64>,
     /// Median over frames of the line residual that the stage reports, pixels of the picture.
     pub line_residual_median_px: Option<f64>,
-    /// Frames by how sure the stage was and how often it was right to 1 % of the width: (lowest, highest confidence, frames, right).
+    /// Frames by how sure the stage was and how often it was right, nine of ten points within 20 px: (lowest, highest confidence, frames, right).
     pub reliability: Vec<(f64, f64, usize, usize)>,
     /// What `reliability` counts: the confidence of every best guess, sure enough or not, and whether it was right.
     pub guesses: Vec<(f64, bool)>,
@@ -95,12 +97,12 @@ pub(super) struct FrameErrors {
 }
 
 impl FrameErrors {
-    /// Nine of ten points within a hundredth of the width, and no camera where there is no pitch.
+    /// Nine of ten points within [`FALSE_PX`], and no camera where there is no pitch.
     pub(super) fn is_right(&self) -> bool {
         let mut errors = self.errors_px.clone();
         errors.sort_by(f64::total_cmp);
         let high = errors.get((0.9 * errors.len() as f64) as usize);
-        self.false_camera != Some(true) && high.is_some_and(|&error| error <= 0.01 * STATED_WIDTH_PX)
+        self.false_camera != Some(true) && high.is_some_and(|&error| error <= FALSE_PX)
     }
 }
 
