@@ -223,7 +223,7 @@ pub struct Segment {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
-    /// One shot of a camera that saw the pitch. People have other identities than in other shots.
+    /// One shot of a camera that saw the pitch. People may have other identities than in other shots.
     Shot,
     /// The broadcast showed something else: a close-up, a replay, a dissolve. There are no frames.
     Gap,
