@@ -169,12 +169,11 @@ fn the_stronger_picture_of_a_dissolve_is_followed() {
     let known = Known { pitch: Pitch::default(), given: None, finders: Some(&finders), apart: false };
     let found = images(&all, &shots, &known).unwrap();
     let mut followed = 0;
-    for index in 16..22 {
-        let estimate = &found.frames[index];
+    for (index, (estimate, truth)) in found.frames.iter().zip(&truth).enumerate().take(22).skip(16) {
         assert!(estimate.reason.as_ref().unwrap().contains("dissolve"), "{estimate:?}");
         let Some(camera) = estimate.camera else { continue };
         followed += 1;
-        let error = median(&reprojection(&truth[index], &camera)).unwrap();
+        let error = median(&reprojection(truth, &camera)).unwrap();
         assert!(error < 1.5, "frame {index}: {error} px");
     }
     assert!(followed >= 4, "{followed} of 6");
