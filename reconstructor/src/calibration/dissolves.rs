@@ -26,22 +26,22 @@ pub(super) fn follow(
     let dissolves = shots.transitions.iter().filter(|t| t.kind == TransitionKind::Dissolve);
     for Range { start, end } in dissolves.map(|transition| transition.frames.clone()) {
         let middle = usize::midpoint(start, end);
-        let before = start.checked_sub(1).map(|last| (last, last.saturating_sub(1)));
-        extend(estimates, frames, start..middle, before, samples);
-        extend(estimates, frames, (middle..end).rev(), Some((end, end + 1)), samples);
+        if let Some(last) = start.checked_sub(1) {
+            extend(estimates, frames, start..middle, [last, last.saturating_sub(1)], samples);
+        }
+        extend(estimates, frames, (middle..end).rev(), [end, end + 1], samples);
     }
 }
 
-/// Goes on from the frames `known`, the nearer one first.
+/// Goes on from two frames of the shot, the nearer one first.
 fn extend(
     estimates: &mut [CameraEstimate],
     frames: &[FrameLines],
     order: impl Iterator<Item = usize>,
-    known: Option<(usize, usize)>,
+    [nearer, farther]: [usize; 2],
     samples: &[Sample],
 ) {
     let camera = |index: usize| estimates.get(index).and_then(|estimate| estimate.camera);
-    let Some((nearer, farther)) = known else { return };
     let Some(mut last) = camera(nearer) else { return };
     let mut before = camera(farther).unwrap_or(last);
     let confidence = estimates.get(nearer).and_then(|estimate| estimate.confidence);

@@ -153,7 +153,8 @@ pub(super) fn anchors(
     }
 }
 
-/// Whether given cameras go with the lines of their frames; `numbers` are the clip frames of `frames`. Of several in a shot the worst may be wrong, not all.
+/// Whether given cameras go with the lines of their frames; `numbers` are the clip frames of `frames`. Of several in a shot the worst
+/// may be wrong, not all.
 pub(super) fn check(
     given: &[Anchor],
     numbers: &[u32],

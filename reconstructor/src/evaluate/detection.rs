@@ -18,9 +18,6 @@ use crate::{
     report::{Progress, thread_cpu_s},
 };
 
-/// Overlap (intersection over union) at which a box counts as found.
-const IOU_MIN: f64 = 0.5;
-
 /// Figures of finding people.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct DetectionFigures {
@@ -65,7 +62,8 @@ pub enum DetectionEvaluationError {
     Pose(#[from] PoseError),
 }
 
-/// Finds people in labelled pictures (`images/` and `labels/` in the YOLO form), each alone, and holds them against the labels.
+/// Finds people in labelled pictures (`images/` and `labels/` in the YOLO form), each alone, and holds them against the labels. Every
+/// pitch is taken to be 105×68 m: such labels do not say.
 ///
 /// # Errors
 /// When the folder holds no labelled pictures or a network cannot run.
@@ -145,15 +143,13 @@ impl Finder {
 }
 
 fn figures(pictures: &[LabelledPicture], found: &[Found]) -> DetectionFigures {
-    let labels: Vec<&[PixelBox]> = pictures.iter().map(|picture| picture.people.as_slice()).collect();
-    let of =
-        |boxes: &dyn Fn(&Found) -> Vec<Scored>| rate(&labels, &found.iter().map(boxes).collect::<Vec<_>>());
-    let (detector, people) = (of(&|found| found.detections.clone()), of(&|found| found.people.clone()));
+    let detector = rate(pictures, found.iter().map(|found| found.detections.as_slice()));
+    let people = rate(pictures, found.iter().map(|found| found.people.as_slice()));
     let count = found.len().max(1) as f64;
     DetectionFigures {
         pictures: pictures.len(),
         cameras: found.iter().filter(|found| found.camera).count(),
-        people: labels.iter().map(|labels| labels.len()).sum(),
+        people: pictures.iter().map(|picture| picture.people.len()).sum(),
         people_recall: people.recall,
         people_precision: people.precision,
         people_average_precision: people.average_precision,
@@ -173,28 +169,16 @@ struct Rates {
     average_precision: f64,
 }
 
-/// Boxes against labels, picture by picture: the surest box first takes the free label that it overlaps most.
-fn rate(labels: &[&[PixelBox]], boxes: &[Vec<Scored>]) -> Rates {
+/// Boxes against labels, picture by picture.
+fn rate<'a>(pictures: &[LabelledPicture], boxes: impl IntoIterator<Item = &'a [Scored]>) -> Rates {
     let mut decided: Vec<(f64, bool)> = Vec::new();
-    for (labels, boxes) in labels.iter().zip(boxes) {
-        let mut boxes = boxes.clone();
+    for (picture, boxes) in pictures.iter().zip(boxes) {
+        let mut boxes = boxes.to_vec();
         boxes.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let mut free = vec![true; labels.len()];
-        for (bounds, score) in boxes {
-            let best = labels
-                .iter()
-                .enumerate()
-                .filter(|(index, _)| free.get(*index) == Some(&true))
-                .map(|(index, label)| (index, label.iou(&bounds)))
-                .filter(|(_, overlap)| *overlap >= IOU_MIN)
-                .max_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some(place) = best.and_then(|(index, _)| free.get_mut(index)) {
-                *place = false;
-            }
-            decided.push((score, best.is_some()));
-        }
+        let claims = picture.claims(boxes.iter().map(|(bounds, _)| bounds));
+        decided.extend(boxes.iter().map(|(_, score)| *score).zip(claims));
     }
-    let people: usize = labels.iter().map(|labels| labels.len()).sum();
+    let people: usize = pictures.iter().map(|picture| picture.people.len()).sum();
     let right = decided.iter().filter(|(_, right)| *right).count();
     decided.sort_by(|a, b| b.0.total_cmp(&a.0));
     Rates {
@@ -235,14 +219,15 @@ mod tests {
 
     #[test]
     fn every_label_is_found_once_and_the_rest_is_wrong() {
-        let labels = [at(0.0), at(100.0)];
+        let picture = |people| LabelledPicture { picture: RgbImage::new(1, 1), people, balls: Vec::new() };
+        let labels = [picture(vec![at(0.0), at(100.0)]), picture(Vec::new())];
         // Two boxes on one label, one beside everything; the second picture is empty.
-        let boxes = vec![vec![(at(1.0), 0.9), (at(0.0), 0.8), (at(50.0), 0.7)], Vec::new()];
-        let rates = rate(&[&labels, &[]], &boxes);
+        let boxes = [(at(50.0), 0.7), (at(1.0), 0.9), (at(0.0), 0.8)];
+        let rates = rate(&labels, [&boxes[..], &[]]);
         assert_eq!((rates.recall, rates.precision), (0.5, 1.0 / 3.0));
         assert_eq!(rates.average_precision, 0.5);
         assert_eq!(
-            rate(&[&labels], &[Vec::new()]),
+            rate(&labels[..1], [&[][..]]),
             Rates { recall: 0.0, precision: 0.0, average_precision: 0.0 }
         );
     }

@@ -13,6 +13,8 @@ use crate::geometry::PixelBox;
 pub const SIZE_PX: (u32, u32) = (1280, 720);
 /// Class of the ball; every other class is a person.
 const BALL: u32 = 0;
+/// Overlap (intersection over union) at which a box counts as found.
+const IOU_MIN: f64 = 0.5;
 /// More boxes than any picture of a match has.
 const BOXES_MAX: usize = 1000;
 
@@ -25,6 +27,20 @@ pub struct LabelledPicture {
     pub people: Vec<PixelBox>,
     /// Boxes of balls, pixels of `picture`.
     pub balls: Vec<PixelBox>,
+}
+
+impl LabelledPicture {
+    /// Whether each box, the surest first, is of a labelled person: it takes the free label that it overlaps most, by
+    /// [`IOU_MIN`] at least.
+    pub(super) fn claims<'a>(&self, boxes: impl IntoIterator<Item = &'a PixelBox>) -> Vec<bool> {
+        let mut free: Vec<&PixelBox> = self.people.iter().collect();
+        let claim = |bounds: &PixelBox| {
+            let overlaps = free.iter().map(|label| label.iou(bounds)).enumerate();
+            let best = overlaps.filter(|(_, overlap)| *overlap >= IOU_MIN).max_by(|a, b| a.1.total_cmp(&b.1));
+            best.map(|(index, _)| free.swap_remove(index)).is_some()
+        };
+        boxes.into_iter().map(claim).collect()
+    }
 }
 
 /// A folder or file of labelled pictures could not be read.

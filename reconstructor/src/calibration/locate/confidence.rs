@@ -56,8 +56,8 @@ impl Agreement {
     }
 
     /// Probability that the camera is right: that nine of ten points of the pitch are within 2 % of the picture's width. A
-    /// logistic function of the shares with weights set by hand, its slope and offset fitted to spoiled rendered pictures of
-    /// matches that no network was trained on (`training/pitch/confidence.py`). Real pictures are harder; the evaluation's
+    /// logistic function of the shares with weights set by hand, its slope and offset fitted to rendered pictures, plain and
+    /// spoiled, of matches that no network was trained on (`training/pitch/confidence.py`). Real pictures are harder; the evaluation's
     /// reliability table says by how much.
     pub(super) fn confidence(&self) -> f64 {
         let agreement = 8.0 * (self.explained - 0.6) + 6.0 * (self.seen - 0.45) + 0.25 * (self.support - 6.0);

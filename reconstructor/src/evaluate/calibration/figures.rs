@@ -58,7 +58,8 @@ pub struct CalibrationFigures {
     pub ground_error_median_m: Option<f64>,
     /// Median over frames of the line residual that the stage reports, pixels of the picture.
     pub line_residual_median_px: Option<f64>,
-    /// Frames by how sure the stage was and how often it was right, nine of ten points within 20 px: (lowest, highest confidence, frames, right).
+    /// Frames by how sure the stage was and how often it was right, nine of ten points within 20 px: (lowest, highest confidence,
+    /// frames, right).
     pub reliability: Vec<(f64, f64, usize, usize)>,
     /// What `reliability` counts: the confidence of every best guess, sure enough or not, and whether it was right.
     pub guesses: Vec<(f64, bool)>,

@@ -95,6 +95,14 @@ pub enum CalibrationEvaluationError {
         /// The folder.
         path: PathBuf,
     },
+    /// Single pictures have no tripod in common.
+    #[error(
+        "{path}: `--without tripod` leaves out what the frames of a shot share, and these are single pictures; give a rendered clip"
+    )]
+    NoShots {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A file of the folder cannot be read or understood.
     #[error("{path}: {reason}; restore the file from its source")]
     File {
@@ -111,6 +119,9 @@ pub enum CalibrationEvaluationError {
     Inference(#[from] InferenceError),
 }
 
+/// What tells folders of single pictures.
+const PICTURE_SETS: [&str; 3] = ["frames.jsonl", "pitch_points.json", "homographies.json"];
+
 /// Evaluates the stage on a folder with truth.
 ///
 /// # Errors
@@ -122,6 +133,8 @@ pub fn evaluate(
 ) -> Result<CalibrationFigures, CalibrationEvaluationError> {
     let figures = if data.join("truth.json").is_file() {
         rendered::clip(data, options, progress)?
+    } else if options.apart() && PICTURE_SETS.iter().any(|name| data.join(name).is_file()) {
+        return Err(CalibrationEvaluationError::NoShots { path: data.into() });
     } else if data.join("frames.jsonl").is_file() {
         rendered::pictures(data, options, progress)?
     } else if data.join("pitch_points.json").is_file() {
@@ -250,5 +263,14 @@ mod tests {
         std::fs::write(folder.path().join("truth.json"), "{}").unwrap();
         let error = run();
         assert!(error.to_string().contains("truth.json"), "{error}");
+    }
+
+    #[test]
+    fn single_pictures_have_no_tripod_to_leave_out() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("frames.jsonl"), "").unwrap();
+        let options = EvaluationOptions { without: vec![Part::Tripod], ..EvaluationOptions::default() };
+        let error = evaluate(folder.path(), &options, &Progress::hidden()).unwrap_err();
+        assert!(error.to_string().contains("single pictures"), "{error}");
     }
 }

@@ -13,10 +13,9 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::labelled::{self, LabelError};
+use super::labelled::{self, LabelError, LabelledPicture};
 use crate::{detection::DetectionError, pose::PoseError, report::Progress};
 
-pub use super::labelled::{LabelledPicture, SIZE_PX};
 pub use sheet::{SheetError, sheet};
 
 /// Figures of one measure over all pictures, or over all people of all pictures.
