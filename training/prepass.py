@@ -3,6 +3,8 @@
 POSE_CONVENTION.md says how the outputs are read. The person's box is the true one, moved a little as a detector would.
 """
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 import onnxruntime
@@ -54,6 +56,33 @@ def estimate(session, image, box):
     pixels = centre + (landmarks.reshape(39, 5)[:33, :2].astype(float) / INPUT - 0.5) * side
     depth = world.reshape(39, 3)[:33, 2].astype(float)
     return pixels, depth - (depth[23] + depth[24]) / 2, _back(sigmoid(logits.reshape(INPUT, INPUT).astype(np.float32)), image.shape, centre, side), float(flag.item())
+
+
+class Look(NamedTuple):
+    """What the network sees in one box of a whole picture: joints (33, 2) in its pixels, visibility (33,), mask 0..1 on the pixels inside the
+    square and the picture, of which the first is at `first` (x, y), flag 0..1."""
+
+    joints: np.ndarray
+    visibility: np.ndarray
+    mask: np.ndarray
+    first: np.ndarray
+    flag: float
+
+
+def look(session, picture, box):
+    """As `PoseEstimator::look` of the reconstructor, before islands go."""
+    centre = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2])
+    side = max(BOX_MARGIN * max(box[2] - box[0], box[3] - box[1]), 1.0)
+    crop = sample_quickly(picture, centre, side, INPUT)[None] / np.float32(255.0)
+    landmarks, flag, logits, _, _ = session.run(None, {"input_1": crop})
+    landmarks = landmarks.reshape(39, 5)[:33]
+    joints = centre + (landmarks[:, :2].astype(float) / INPUT - 0.5) * side
+    limit = np.array([picture.shape[1], picture.shape[0]]) - 1
+    first = np.maximum(np.ceil(centre - side / 2), 0).astype(int)
+    last = np.minimum(np.floor(centre + side / 2), limit).astype(int)
+    size = np.maximum(last - first + 1, 1)
+    mask = _back(sigmoid(logits.reshape(INPUT, INPUT).astype(np.float32)), (size[1], size[0]), centre - first, side)
+    return Look(joints, sigmoid(landmarks[:, 3]), mask / np.float32(255.0), first, float(flag.item()))
 
 
 def _back(probability, shape, centre, side):

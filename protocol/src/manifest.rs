@@ -198,12 +198,18 @@ pub struct FileEntry {
 pub struct Person {
     /// Used by the chunks.
     pub id: PersonId,
-    /// Team, when known.
+    /// Team, when known: `a` or `b` where it was found by the kits (nobody knows which one plays at home), `home` or `away` where it was given.
     pub team: Option<String>,
+    /// How likely the team is right, 0..1, when it was estimated.
+    pub team_confidence: Option<f32>,
     /// Role, when known: `player`, `goalkeeper`, `referee`, `assistant`.
     pub role: Option<String>,
+    /// How likely the role is right, 0..1, when it was estimated.
+    pub role_confidence: Option<f32>,
     /// Shirt number, when it was read.
     pub number: Option<u8>,
+    /// How likely the number is right, 0..1, when it was read from the picture.
+    pub number_confidence: Option<f32>,
     /// Main colour of the shirt, sRGB.
     pub shirt_rgb: Option<[u8; 3]>,
 }
@@ -223,7 +229,7 @@ pub struct Segment {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SegmentKind {
-    /// One shot of a camera that saw the pitch. People may have other identities than in other shots.
+    /// One shot of a camera that saw the pitch. People may have other identities than in other shots: those of whom it is not sure who they are.
     Shot,
     /// The broadcast showed something else: a close-up, a replay, a dissolve. There are no frames.
     Gap,

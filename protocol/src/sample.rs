@@ -85,7 +85,7 @@ pub fn frame_of(frame: u32, people: u32) -> ChunkFrame {
         duration: FRAME,
         camera: Some(Camera::looking_at((1280, 720), 1400.0, DVec3::new(0.0, 18.0, 75.0), ball)),
         quality: FrameQuality { line_residual_px: Some(1.25), track_confidence: Some(0.75) },
-        ball: Some(Ball { position_m: ball, height_known: false }),
+        ball: Some(Ball { position_m: ball, height_known: false, spread: None }),
         atlas: (people > 0).then(|| atlas(people)),
         bodies: (0..people)
             .map(|person| Body {
@@ -110,8 +110,11 @@ fn person(index: u32) -> Person {
     Person {
         id: PersonId(index),
         team: Some(if home { "home" } else { "away" }.to_owned()),
+        team_confidence: None,
         role: Some("player".to_owned()),
+        role_confidence: None,
         number: u8::try_from(index / 2 + 1).ok(),
+        number_confidence: None,
         shirt_rgb: Some(shirt(index)),
     }
 }

@@ -4,7 +4,7 @@ use std::{net::SocketAddr, ops::Range, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use protocol::pitch::Pitch;
-use reconstructor::calibration::is_possible;
+use reconstructor::{calibration::is_possible, tracking::TrackingMethod};
 
 /// Turns a broadcast football clip into a match that stands on a table.
 #[derive(Debug, Parser)]
@@ -62,6 +62,9 @@ pub(crate) struct Reconstruct {
     /// Write figures per frame and stage, and everything that was left out.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
+    /// How people are followed: `global` is the usual one, `greedy` the paper's, as a baseline.
+    #[arg(long, value_name = "global|greedy", default_value = "global", value_parser = tracking)]
+    pub(crate) tracking: TrackingMethod,
     /// Triangles per body at most.
     #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(50..=100_000))]
     pub(crate) triangles: u32,
@@ -156,6 +159,16 @@ pub(crate) enum Evaluate {
         after_help = "Example:\n  cargo xtask dataset frames-test --count 48\n  reconstructor evaluate detection --data target/datasets/frames-test --json detection.json"
     )]
     Detection(EvaluateDetection),
+    /// Who is who over time in a rendered clip, against its truth: HOTA, identities, teams, with the greedy baseline beside it.
+    #[command(
+        after_help = "Example:\n  reconstructor synthesize --out target/clip --seed 7 --frames 250 --shots main:100,high-behind:50,main\n  reconstructor evaluate tracking --data target/clip --json tracking.json"
+    )]
+    Tracking(EvaluateTracking),
+    /// How well masks fit the true visible pixels of people in a rendered clip, method by method, and how far joints are off.
+    #[command(
+        after_help = "Example:\n  reconstructor synthesize --out clip --seed 7 --frames 100 --maps\n  reconstructor evaluate segmentation --data clip --json segmentation.json"
+    )]
+    Segmentation(EvaluateSegmentation),
     /// How like real broadcasts rendered pictures are: both measured alike, worst measure first.
     #[command(
         after_help = "Example:\n  cargo xtask dataset frames-test --count 48\n  reconstructor evaluate realism --real ../shared/data/detection/dfl --ours target/datasets/frames-test --json realism.json"
@@ -171,6 +184,41 @@ pub(crate) struct EvaluateDetection {
     /// Where the figures go.
     #[arg(long, value_name = "FILE")]
     pub(crate) json: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateTracking {
+    /// Folder that `synthesize` wrote.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+    /// Folder that keeps the results of stages, so that interrupted work resumes.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) work: Option<PathBuf>,
+    /// Also write our tracks in the form of the MOT Challenge, for TrackEval and others.
+    #[arg(long, value_name = "FILE.txt")]
+    pub(crate) tracks: Option<PathBuf>,
+    /// Frames worked on at a time; one per core when not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) threads: Option<u16>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateSegmentation {
+    /// Folder that `synthesize --maps` wrote.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: PathBuf,
+    /// Folder that keeps the results of the stages before, so that interrupted work resumes.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) work: Option<PathBuf>,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+    /// Measure only this method; may be repeated. The default's figures come first when none is given, then all others'.
+    #[arg(long, value_name = "METHOD")]
+    pub(crate) segmentation: Vec<reconstructor::segmentation::Method>,
 }
 
 #[derive(Debug, Args)]
@@ -263,6 +311,15 @@ fn frame_range(text: &str) -> Result<Range<u32>, String> {
         Ok(start..end)
     } else {
         Err(format!("`{text}` holds no frames; the end must be larger"))
+    }
+}
+
+/// The name of a way to follow people.
+fn tracking(text: &str) -> Result<TrackingMethod, String> {
+    match text {
+        "global" => Ok(TrackingMethod::Global),
+        "greedy" => Ok(TrackingMethod::Greedy),
+        _ => Err(format!("`{text}` is no way to follow people; write global or greedy")),
     }
 }
 

@@ -130,7 +130,7 @@ fn environment(library: Option<&Path>) -> Result<Environment, InferenceError> {
     Ok(environment)
 }
 
-/// The file of a model that ships with the project, by its file name (`nanodet_g_416.onnx`).
+/// The file of a model that ships with the project, by its file name (`people.onnx`).
 ///
 /// Looks into `models/` of the folder that [`ASSETS_VARIABLE`] names, else into `assets/models/` beside the executable,
 /// of a folder above it, and of the source tree.

@@ -1,10 +1,13 @@
 //! Clip to stream: the pipeline of "Soccer on Your Tabletop" (Rematas et al., CVPR 2018), one module per section.
 //!
-//! `ingest → shots → detection → calibration → pose → tracking → segmentation → depth → mesh → trajectory → encode`.
+//! `ingest → shots → detection → calibration → pose → tracking → teams → jumps → ball → segmentation → depth → mesh → trajectory → encode`.
 //! A stage is one entry function with typed input and output; no stage imports a later one.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod assignment;
+pub mod ball;
+mod banded;
 pub mod calibration;
 pub mod depth;
 pub mod detection;
@@ -13,6 +16,7 @@ pub mod evaluate;
 pub mod geometry;
 pub mod inference;
 pub mod ingest;
+pub mod jumps;
 pub mod mesh;
 pub mod pipeline;
 pub mod pose;
@@ -20,5 +24,6 @@ pub mod report;
 pub mod segmentation;
 pub mod serve;
 pub mod shots;
+pub mod teams;
 pub mod tracking;
 pub mod trajectory;

@@ -19,10 +19,11 @@ use reconstructor::{
         command::{self, CalibrateOptions},
     },
     encode::read_stream,
-    evaluate::{self, depth, matches},
+    evaluate::{self, air, depth, frame_truth, matches},
     mesh::MeshBudget,
-    pipeline::{ReconstructOptions, reconstruct},
+    pipeline::{ObserveOptions, ReconstructOptions, reconstruct},
     report::{Progress, Reporter},
+    segmentation::Method,
     serve::serve,
     tracking::TrackingLimits,
     trajectory::Smoothing,
@@ -82,28 +83,48 @@ fn run(command: Command) -> Result<()> {
             drop(progress);
             write_figures(&arguments.json, &figures)
         }
+        Command::Evaluate(Evaluate::Tracking(arguments)) => {
+            let evaluation = evaluate::tracking::TrackingEvaluation {
+                data: arguments.data,
+                work: arguments.work,
+                tracks: arguments.tracks,
+                threads: threads(arguments.threads),
+            };
+            let figures = evaluate::tracking::evaluate(&evaluation, &mut Reporter::new())?;
+            write_figures(&arguments.json, &figures)
+        }
+        Command::Evaluate(Evaluate::Segmentation(arguments)) => {
+            let methods = match arguments.segmentation {
+                chosen if chosen.is_empty() => Method::ALL.to_vec(),
+                chosen => chosen,
+            };
+            let (data, work) = (arguments.data, arguments.work);
+            let options = evaluate::segmentation::SegmentationOptions { data, work, methods };
+            write_figures(&arguments.json, &evaluate::segmentation::evaluate(&options)?)
+        }
         Command::Evaluate(Evaluate::Realism(arguments)) => run_evaluate_realism(&arguments),
         Command::Serve(arguments) => Ok(serve(&arguments.stream, arguments.listen)?),
     }
 }
 
 fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let options = ReconstructOptions {
-        clip: arguments.clip,
+        observe: ObserveOptions {
+            clip: arguments.clip,
+            calibration: arguments.calibration,
+            pitch: arguments.pitch,
+            frames: arguments.frames,
+            work: arguments.work,
+            tracking: TrackingLimits { method: arguments.tracking, ..TrackingLimits::default() },
+            threads: threads(arguments.threads),
+        },
         out: arguments.out,
-        calibration: arguments.calibration,
-        pitch: arguments.pitch,
-        frames: arguments.frames,
-        work: arguments.work,
         budget: MeshBudget { triangles: arguments.triangles as usize },
-        tracking: TrackingLimits::default(),
         smoothing: Smoothing::default(),
-        threads: arguments.threads.map_or(cores, usize::from),
     };
     let mut reporter = Reporter::new();
     let report = reconstruct(&options, &mut reporter).inspect_err(|_| {
-        if let Some(work) = options.work.as_ref().filter(|work| work.exists()) {
+        if let Some(work) = options.observe.work.as_ref().filter(|work| work.exists()) {
             tracing::info!("finished parts stay in {}; the same command resumes", work.display());
         }
     })?;
@@ -121,6 +142,12 @@ fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
         report.seconds_per_frame,
     );
     Ok(())
+}
+
+/// Frames worked on at a time.
+fn threads(asked: Option<u16>) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    asked.map_or_else(cores, usize::from)
 }
 
 fn run_calibrate(arguments: cli::Calibrate) -> Result<()> {
@@ -210,6 +237,15 @@ fn run_synthesize(arguments: cli::Synthesize) -> Result<()> {
     Ok(())
 }
 
+/// What `evaluate match` prints.
+#[derive(Serialize)]
+struct AllFigures {
+    #[serde(flatten)]
+    people: matches::MatchFigures,
+    #[serde(flatten)]
+    air: Option<air::AirFigures>,
+}
+
 fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
     let limits = Limits::default();
     let truth = arguments.data.join("truth");
@@ -220,7 +256,15 @@ fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
     let truth = frames(&truth)
         .context("the true stream cannot be read; --data names the folder that holds truth/")?;
     let ours = frames(&arguments.stream).context("the reconstructed stream cannot be read")?;
-    write_figures(&arguments.json, &matches::compare(&truth, &ours))
+    let frames = arguments.data.join(frame_truth::FILE_NAME);
+    let air = if frames.exists() {
+        Some(air::compare(&frame_truth::frames::<air::FrameLine>(&arguments.data)?, &truth, &ours))
+    } else {
+        tracing::warn!("there is no {}, so ball and jumps are not measured", frames.display());
+        None
+    };
+    let figures = AllFigures { people: matches::compare(&truth, &ours), air };
+    write_figures(&arguments.json, &figures)
 }
 
 /// A distance for people to read.

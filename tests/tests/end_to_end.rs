@@ -11,7 +11,7 @@ use reconstructor::{
     evaluate::matches,
     inference,
     mesh::MeshBudget,
-    pipeline::{ReconstructOptions, reconstruct},
+    pipeline::{ObserveOptions, ReconstructOptions, reconstruct},
     report::{ReconstructReport, Reporter, Stage},
     tracking::TrackingLimits,
     trajectory::Smoothing,
@@ -39,16 +39,18 @@ fn ready() -> bool {
 
 fn run(out: &Path, work: &Path) -> ReconstructReport {
     let options = ReconstructOptions {
-        clip: demo("clip.mp4"),
+        observe: ObserveOptions {
+            clip: demo("clip.mp4"),
+            calibration: None,
+            pitch: None,
+            frames: Some(FRAMES),
+            work: Some(work.to_owned()),
+            tracking: TrackingLimits::default(),
+            threads: 2,
+        },
         out: out.to_owned(),
-        calibration: None,
-        pitch: None,
-        frames: Some(FRAMES),
-        work: Some(work.to_owned()),
         budget: MeshBudget::default(),
-        tracking: TrackingLimits::default(),
         smoothing: Smoothing::default(),
-        threads: 2,
     };
     reconstruct(&options, &mut Reporter::quiet()).unwrap()
 }

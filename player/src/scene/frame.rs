@@ -92,7 +92,7 @@ impl FrameScene {
                 half_m: [0.16 + above * 0.05; 2],
                 strength: SHADOW_STRENGTH / (1.0 + above),
             });
-            scene.ball = Some(ball::build(centre.with_y(centre.y.max(ball::BALL_RADIUS_M))));
+            scene.ball = Some(ball::build(ball));
         }
         scene.atlas = atlas;
         Ok(scene)
@@ -220,8 +220,16 @@ mod tests {
 
     #[test]
     fn without_texture_people_wear_their_shirts_colour() {
-        let person =
-            Person { id: PersonId(3), team: None, role: None, number: None, shirt_rgb: Some([200, 10, 20]) };
+        let person = Person {
+            id: PersonId(3),
+            team: None,
+            team_confidence: None,
+            role: None,
+            role_confidence: None,
+            number: None,
+            number_confidence: None,
+            shirt_rgb: Some([200, 10, 20]),
+        };
         let frame = frame_with(vec![triangle_at(0.0, 0.0)]);
         let scene = FrameScene::new(&frame, &[person], &Limits::default()).unwrap();
         let [r, g, _, _] = scene.vertices[0].tint;
@@ -239,7 +247,8 @@ mod tests {
     #[test]
     fn a_ball_on_the_grass_touches_it() {
         let mut frame = frame_with(Vec::new());
-        frame.ball = Some(Ball { position_m: glam::DVec3::new(1.0, 0.0, 2.0), height_known: false });
+        frame.ball =
+            Some(Ball { position_m: glam::DVec3::new(1.0, 0.0, 2.0), height_known: false, spread: None });
         let scene = FrameScene::new(&frame, &[], &Limits::default()).unwrap();
         let lowest =
             scene.ball.unwrap().vertices.iter().map(|v| v.position_m[1]).fold(f32::INFINITY, f32::min);

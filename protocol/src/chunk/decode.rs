@@ -78,6 +78,9 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Chunk, ChunkError> {
             }
             bodies.push(file.body(position, *track, mesh, limits, &mut budget)?);
         }
+        if !entry.ball.is_none_or(|ball| ball.is_possible()) {
+            return Err(ChunkError::Frame { frame: position, problem: "the ball is nowhere near the pitch" });
+        }
         frames.push(ChunkFrame {
             clip_frame: entry.clip_frame,
             start: entry.start,

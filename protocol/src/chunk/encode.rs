@@ -73,7 +73,9 @@ fn check_frames(frames: &[ChunkFrame]) -> Result<(), ChunkError> {
             return Err(problem("a person has two bodies"));
         }
         if !finite(content) {
-            return Err(problem("the camera, the ball, an anchor or a figure is not a number"));
+            return Err(problem(
+                "the camera, the ball, an anchor or a figure is not a number, or the ball is nowhere near",
+            ));
         }
         if content.atlas.as_ref().is_some_and(|atlas| atlas.size_px().is_none()) {
             return Err(problem("the atlas is not a picture of the format it says"));
@@ -91,7 +93,7 @@ fn finite(frame: &ChunkFrame) -> bool {
     });
     let figures = [frame.quality.line_residual_px, frame.quality.track_confidence];
     camera
-        && frame.ball.is_none_or(|ball| ball.position_m.is_finite())
+        && frame.ball.is_none_or(|ball| ball.is_possible())
         && figures.iter().flatten().all(|figure| figure.is_finite())
         && frame.bodies.iter().all(|body| body.anchor_m.is_finite())
 }

@@ -85,6 +85,32 @@ pub struct Ball {
     pub position_m: DVec3,
     /// Whether its height was measured; when not, it is taken to lie on the grass.
     pub height_known: bool,
+    /// How far the position can be trusted; absent when nothing is told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread: Option<BallSpread>,
+}
+
+/// Standard deviations of the ball's position. One camera sees a ball in the air exactly across its line of sight and
+/// hardly along it, so there are two.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BallSpread {
+    /// Along the line of sight of the broadcast camera, metres.
+    pub along_m: f32,
+    /// Across it, metres.
+    pub across_m: f32,
+}
+
+impl Ball {
+    /// The position farthest from the centre mark that a stream may give a ball, and its largest spread, metres.
+    pub const FARTHEST_M: f64 = 1_000.0;
+
+    /// Whether all values are numbers within bounds.
+    #[must_use]
+    pub fn is_possible(&self) -> bool {
+        let place = self.position_m.is_finite() && self.position_m.length() <= Self::FARTHEST_M;
+        let spread = |m: f32| (0.0..=Self::FARTHEST_M as f32).contains(&m);
+        place && self.spread.is_none_or(|s| spread(s.along_m) && spread(s.across_m))
+    }
 }
 
 /// An encoded picture in a format that glTF allows.

@@ -43,6 +43,7 @@ fn assert_close(original: &Chunk, back: &Chunk) {
         }
         assert_eq!(a.camera.is_some(), b.camera.is_some());
         assert_eq!(a.ball.map(|ball| ball.height_known), b.ball.map(|ball| ball.height_known));
+        assert_eq!(a.ball.map(|ball| ball.spread), b.ball.map(|ball| ball.spread));
         for (a, b) in a.bodies.iter().zip(&b.bodies) {
             assert_eq!((a.person, a.anchor_m), (b.person, b.anchor_m));
             assert_eq!(a.mesh.triangles.len(), b.mesh.triangles.len());
@@ -426,4 +427,43 @@ fn a_small_file_cannot_ask_for_much() {
     });
     let error = decode(&boastful, &Limits::default()).unwrap_err().to_string();
     assert!(error.contains("person 0"), "{error}");
+}
+
+/// A chunk of one frame whose only content is the ball.
+fn with_ball(ball: Ball) -> Chunk {
+    let mut chunk = sample::chunk_of(0, 1, 0);
+    chunk.frames[0].ball = Some(ball);
+    chunk
+}
+
+#[test]
+fn the_spread_of_the_ball_comes_back_and_older_streams_have_none() {
+    let spread = BallSpread { along_m: 1.25, across_m: 0.0625 };
+    let ball = Ball { position_m: DVec3::new(3.0, 2.0, -7.0), height_known: true, spread: Some(spread) };
+    let bytes = encode(&with_ball(ball), sample::TIMESCALE).unwrap();
+    let back = decode(&bytes, &Limits::default()).unwrap();
+    assert_eq!(back.frames[0].ball.unwrap().spread, Some(spread));
+    let older: Ball = serde_json::from_str(r#"{"position_m":[1,2,3],"height_known":false}"#).unwrap();
+    assert_eq!(older.spread, None);
+}
+
+#[test]
+fn a_ball_beyond_all_bounds_is_refused_on_both_ways() {
+    let ball = |x: f64, along_m: f32| Ball {
+        position_m: DVec3::new(x, 0.1, 0.0),
+        height_known: true,
+        spread: Some(BallSpread { along_m, across_m: 0.1 }),
+    };
+    for bad in [ball(1e300, 1.0), ball(f64::NAN, 1.0), ball(0.0, -1.0), ball(0.0, f32::NAN), ball(0.0, 1e9)] {
+        let refused = encode(&with_ball(bad), sample::TIMESCALE);
+        assert!(matches!(refused, Err(ChunkError::Frame { frame: 0, .. })), "{bad:?}");
+    }
+    // The same on the way in: the JSON of a good chunk with a number of the same length changed.
+    let bytes = encode(&with_ball(ball(12.5, 0.25)), sample::TIMESCALE).unwrap();
+    let text = b"12.5";
+    let at = bytes.windows(text.len()).position(|window| window == text).unwrap();
+    let mut hostile = bytes.clone();
+    hostile[at..at + 4].copy_from_slice(b"1e30");
+    let refused = decode(&hostile, &Limits::default());
+    assert!(matches!(refused, Err(ChunkError::Frame { frame: 0, .. })), "{refused:?}");
 }

@@ -35,6 +35,17 @@ pub(super) fn manifest(manifest: &Manifest, limits: &Limits) -> Result<(), Manif
     if !manifest.people.iter().all(|person| ids.insert(person.id)) {
         return Err(value("people", "names an id twice"));
     }
+    for (index, person) in manifest.people.iter().enumerate() {
+        let told = [
+            ("team_confidence", person.team_confidence),
+            ("role_confidence", person.role_confidence),
+            ("number_confidence", person.number_confidence),
+        ];
+        let outside = |confidence: f32| !(0.0..=1.0).contains(&confidence);
+        if let Some((field, _)) = told.into_iter().find(|(_, told)| told.is_some_and(outside)) {
+            return Err(value(format!("people[{index}].{field}"), "is not between 0 and 1"));
+        }
+    }
     limit("segments", manifest.segments.len(), limits.chunks)?;
     let mut earliest = Ticks(0);
     for (index, segment) in manifest.segments.iter().enumerate() {

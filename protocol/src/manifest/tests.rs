@@ -104,13 +104,16 @@ fn impossible_values_are_named() {
     };
     /// How the document is broken, and what the error names.
     type Case<'a> = (&'a dyn Fn(&mut Value), &'a str);
-    let cases: [Case<'_>; 16] = [
+    let cases: [Case<'_>; 19] = [
         (&|d| d["timescale"]["numerator"] = 0.into(), "timescale"),
         (&|d| d["timescale"]["denominator"] = 0.into(), "timescale"),
         (&|d| d["duration"] = (-1).into(), "duration"),
         (&|d| d["pitch"]["length_m"] = 0.0.into(), "pitch.length_m"),
         (&|d| d["pitch"]["width_m"] = 1e9.into(), "pitch.width_m"),
         (&|d| d["people"][1]["id"] = 0.into(), "people"),
+        (&|d| d["people"][1]["team_confidence"] = 1.5.into(), "people[1].team_confidence"),
+        (&|d| d["people"][0]["role_confidence"] = (-0.1).into(), "people[0].role_confidence"),
+        (&|d| d["people"][0]["number_confidence"] = 1e300.into(), "people[0].number_confidence"),
         (&|d| d["segments"] = json!([{"start": 0, "duration": 0, "kind": "shot"}]), "segments[0]"),
         (&|d| d["segments"] = json!([{"start": -1, "duration": 5, "kind": "shot"}]), "segments[0]"),
         (&|d| d["segments"] = json!([{"start": 5, "duration": i64::MAX, "kind": "gap"}]), "segments[0]"),

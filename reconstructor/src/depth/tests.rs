@@ -99,8 +99,8 @@ fn a_depth_map_covers_the_mask_and_stays_near_the_plane() {
         joints: Vector::read().joints(),
         mask: mask.clone(),
         neck_px: DVec2::splat(20.0),
-        ground_m: DVec3::ZERO,
         neck_m: DVec3::Y,
+        ..Person::blank()
     };
     let map = estimator.estimate(&image, &camera, &person, &mask).unwrap();
     assert_eq!((map.mask.width, map.mask.height), (mask.width, mask.height));

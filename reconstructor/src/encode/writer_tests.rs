@@ -19,7 +19,16 @@ fn header(people: u32) -> StreamHeader {
         timescale: Timescale { numerator: 30_000, denominator: 1 },
         pitch: Pitch::default(),
         people: (0..people)
-            .map(|id| Person { id: PersonId(id), team: None, role: None, number: None, shirt_rgb: None })
+            .map(|id| Person {
+                id: PersonId(id),
+                team: None,
+                team_confidence: None,
+                role: None,
+                role_confidence: None,
+                number: None,
+                number_confidence: None,
+                shirt_rgb: None,
+            })
             .collect(),
         segments: Vec::new(),
     }

@@ -1,22 +1,27 @@
 //! How many of the people on the pitch are found, and how much else (DESIGN section 6): by the detector alone, and by what the
-//! product makes of it, where the camera and the pose decide who stands on the pitch.
+//! product makes of it, where the camera and the pose decide who stands on the pitch; and how often the ball is found in a picture
+//! alone, before anything is known of the frames around.
 
 use std::path::Path;
 
+use glam::DVec2;
 use image::RgbImage;
-use protocol::pitch::Pitch;
+use protocol::{camera::Camera, pitch::Pitch};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::labelled::{self, LabelError, LabelledPicture};
 use crate::{
     calibration::{self, FindCamera},
-    detection::{DetectionError, Detector},
+    detection::{BALL_SURE, BallCandidate, DetectionError, Detector, Found as Shown},
     geometry::PixelBox,
     inference::InferenceError,
-    pose::{PoseError, PoseEstimator},
+    pose::{Person, PoseError, PoseEstimator},
     report::{Progress, thread_cpu_s},
 };
+
+/// The ball is looked for before the pitch and this far around it, metres.
+const BALL_MARGIN_M: f64 = 2.0;
 
 /// Figures of finding people.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -39,8 +44,14 @@ pub struct DetectionFigures {
     pub detector_precision: f64,
     /// See `detector_recall`.
     pub detector_average_precision: f64,
-    /// Labelled balls; nothing finds them yet.
+    /// Labelled balls.
     pub balls: usize,
+    /// Share of them in whose box the middle of the picture's best candidate lies, if it is sure.
+    pub ball_recall: f64,
+    /// Share of the pictures' best candidates, if sure, that lie in a labelled ball's box.
+    pub ball_precision: f64,
+    /// Area under precision over recall of the pictures' best candidates.
+    pub ball_average_precision: f64,
     /// Processor time of a picture, seconds on one core: detector; camera; pose.
     pub cpu_s_per_picture: [f64; 3],
 }
@@ -68,7 +79,7 @@ pub enum DetectionEvaluationError {
 /// # Errors
 /// When the folder holds no labelled pictures or a network cannot run.
 pub fn evaluate(data: &Path, progress: &Progress) -> Result<DetectionFigures, DetectionEvaluationError> {
-    let pictures = labelled::read(data)?;
+    let pictures = labelled::read(data, None)?;
     let share = pictures.len().div_ceil(rayon::current_num_threads()).max(1);
     let parts: Vec<Vec<Found>> = pictures
         .par_chunks(share)
@@ -95,6 +106,8 @@ type Scored = (PixelBox, f64);
 struct Found {
     detections: Vec<Scored>,
     people: Vec<Scored>,
+    /// The best ball candidate: its middle, and how sure it is.
+    ball: Option<(DVec2, f64)>,
     camera: bool,
     cpu_s: [f64; 3],
 }
@@ -123,7 +136,7 @@ impl Finder {
             clock = now;
             now - before
         };
-        let detections = self.detector.detect(picture)?;
+        let Shown { people: detections, balls } = self.detector.detect(picture)?;
         let detector_s = lap();
         let boxes: Vec<PixelBox> = detections.iter().map(|detection| detection.bounds).collect();
         let camera = self.camera.find(picture, &boxes, &pitch)?.ok().filter(|found| found.is_sure());
@@ -135,16 +148,38 @@ impl Finder {
         let pose_s = lap();
         Ok(Found {
             detections: detections.iter().map(|found| (found.bounds, f64::from(found.score))).collect(),
-            people: people.iter().map(|p| (p.bounds, f64::from(p.score * p.pose_score))).collect(),
+            people: people
+                .iter()
+                .filter(|person| is_on(&pitch, person))
+                .map(|person| (person.bounds, f64::from(person.score)))
+                .collect(),
+            ball: ball(&balls, camera.as_ref().map(|found| &found.camera), &pitch),
             camera: camera.is_some(),
             cpu_s: [detector_s, camera_s, pose_s],
         })
     }
 }
 
+/// Whether a person stands on the pitch: who is beside it, as assistants are, is reconstructed but not labelled.
+fn is_on(pitch: &Pitch, person: &Person) -> bool {
+    pitch.contains(DVec2::new(person.ground_m.x, person.ground_m.z), 0.0)
+}
+
+/// The best candidate that the camera sees before the pitch: white things in the stands and beside the pitch are many.
+fn ball(candidates: &[BallCandidate], camera: Option<&Camera>, pitch: &Pitch) -> Option<(DVec2, f64)> {
+    let before_pitch = |candidate: &&BallCandidate| {
+        camera.is_none_or(|camera| {
+            let ground = camera.ground_point(candidate.centre_px);
+            ground.is_some_and(|ground| pitch.contains(DVec2::new(ground.x, ground.z), BALL_MARGIN_M))
+        })
+    };
+    candidates.iter().find(before_pitch).map(|ball| (ball.centre_px, f64::from(ball.score)))
+}
+
 fn figures(pictures: &[LabelledPicture], found: &[Found]) -> DetectionFigures {
     let detector = rate(pictures, found.iter().map(|found| found.detections.as_slice()));
     let people = rate(pictures, found.iter().map(|found| found.people.as_slice()));
+    let ball = rate_ball(pictures, found);
     let count = found.len().max(1) as f64;
     DetectionFigures {
         pictures: pictures.len(),
@@ -157,6 +192,9 @@ fn figures(pictures: &[LabelledPicture], found: &[Found]) -> DetectionFigures {
         detector_precision: detector.precision,
         detector_average_precision: detector.average_precision,
         balls: pictures.iter().map(|picture| picture.balls.len()).sum(),
+        ball_recall: ball.recall,
+        ball_precision: ball.precision,
+        ball_average_precision: ball.average_precision,
         cpu_s_per_picture: [0, 1, 2].map(|k| found.iter().map(|f| f.cpu_s[k]).sum::<f64>() / count),
     }
 }
@@ -188,6 +226,25 @@ fn rate<'a>(pictures: &[LabelledPicture], boxes: impl IntoIterator<Item = &'a [S
     }
 }
 
+/// The best candidate of each picture against the labelled balls.
+fn rate_ball(pictures: &[LabelledPicture], found: &[Found]) -> Rates {
+    let mut decided: Vec<(f64, bool)> = Vec::new();
+    for (picture, found) in pictures.iter().zip(found) {
+        let is_ball = |middle: DVec2| picture.balls.iter().any(|ball| ball.contains(middle));
+        decided.extend(found.ball.map(|(middle, score)| (score, is_ball(middle))));
+    }
+    let balls: usize = pictures.iter().map(|picture| picture.balls.len()).sum();
+    let sure = decided.iter().filter(|(score, _)| *score >= f64::from(BALL_SURE));
+    let right = sure.clone().filter(|(_, right)| *right).count();
+    let count = sure.count();
+    decided.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Rates {
+        recall: right as f64 / balls.max(1) as f64,
+        precision: right as f64 / count.max(1) as f64,
+        average_precision: average_precision(&decided, balls),
+    }
+}
+
 /// Area under the precision that can be had at each recall or better (all points, as PASCAL VOC since 2010); surest first.
 fn average_precision(decided: &[(f64, bool)], people: usize) -> f64 {
     let mut right = 0;
@@ -209,8 +266,6 @@ fn average_precision(decided: &[(f64, bool)], people: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec2;
-
     use super::*;
 
     fn at(x: f64) -> PixelBox {

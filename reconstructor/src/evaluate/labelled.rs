@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use crate::geometry::PixelBox;
 
-/// Every picture is brought to this size: sets of real pictures are often stretched to squares.
-pub const SIZE_PX: (u32, u32) = (1280, 720);
+/// Sets of real pictures are often stretched to squares: a picture that is not 16:9 is brought to this size.
+const STRETCHED_PX: (u32, u32) = (1920, 1080);
 /// Class of the ball; every other class is a person.
 const BALL: u32 = 0;
 /// Overlap (intersection over union) at which a box counts as found.
@@ -21,7 +21,7 @@ const BOXES_MAX: usize = 1000;
 /// A picture with the boxes of its people and its ball.
 #[derive(Clone, Debug)]
 pub struct LabelledPicture {
-    /// The picture, [`SIZE_PX`].
+    /// The picture, 16:9.
     pub picture: RgbImage,
     /// Boxes of the people on the pitch, pixels of `picture`.
     pub people: Vec<PixelBox>,
@@ -53,8 +53,9 @@ pub struct LabelError {
     pub reason: String,
 }
 
-/// Reads every labelled picture of a folder (or of its subfolder `valid`), in the order of their names.
-pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, LabelError> {
+/// Reads every labelled picture of a folder (or of its subfolder `valid`), in the order of their names, and brings it to
+/// `size_px`; when `None`, only those that are not 16:9 are brought to 1920×1080.
+pub(super) fn read(folder: &Path, size_px: Option<(u32, u32)>) -> Result<Vec<LabelledPicture>, LabelError> {
     let inner = folder.join("valid");
     let folder = if inner.join("labels").is_dir() { inner } else { folder.to_owned() };
     let labels = folder.join("labels");
@@ -72,7 +73,6 @@ pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, LabelError> {
         .par_iter()
         .map(|label| {
             let text = std::fs::read_to_string(label).map_err(|error| failed(label, error.to_string()))?;
-            let (people, balls) = boxes(&text).map_err(|reason| failed(label, reason))?;
             let stem = folder.join("images").join(label.file_stem().unwrap_or_default());
             // Names of files may have further dots: the ending is put behind, not instead.
             let named = |ending: &str| {
@@ -84,19 +84,23 @@ pub(super) fn read(folder: &Path) -> Result<Vec<LabelledPicture>, LabelError> {
             let path = path.ok_or_else(|| failed(&stem, "there is no such .jpg or .png".into()))?;
             let reader = ImageReader::open(&path).map_err(|error| failed(&path, error.to_string()))?;
             let picture = reader.decode().map_err(|error| failed(&path, error.to_string()))?.into_rgb8();
-            let picture = if picture.dimensions() == SIZE_PX {
+            let (width, height) = picture.dimensions();
+            let is_broadcast = 9 * u64::from(width) == 16 * u64::from(height);
+            let size = size_px.unwrap_or(if is_broadcast { (width, height) } else { STRETCHED_PX });
+            let picture = if (width, height) == size {
                 picture
             } else {
-                imageops::resize(&picture, SIZE_PX.0, SIZE_PX.1, imageops::FilterType::CatmullRom)
+                imageops::resize(&picture, size.0, size.1, imageops::FilterType::CatmullRom)
             };
+            let (people, balls) = boxes(&text, size).map_err(|reason| failed(label, reason))?;
             Ok(LabelledPicture { picture, people, balls })
         })
         .collect()
 }
 
-/// The boxes of the people and of the balls of one label file.
-fn boxes(text: &str) -> Result<(Vec<PixelBox>, Vec<PixelBox>), String> {
-    let size = DVec2::new(f64::from(SIZE_PX.0), f64::from(SIZE_PX.1));
+/// The boxes of the people and of the balls of one label file, in a picture of `size_px`.
+fn boxes(text: &str, size_px: (u32, u32)) -> Result<(Vec<PixelBox>, Vec<PixelBox>), String> {
+    let size = DVec2::new(f64::from(size_px.0), f64::from(size_px.1));
     let (mut people, mut balls) = (Vec::new(), Vec::new());
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let wrong = || format!("line {}: expected `class x y width height`, found `{line}`", index + 1);
@@ -123,22 +127,22 @@ mod tests {
 
     #[test]
     fn boxes_are_read_and_nonsense_is_named() {
-        let (people, balls) = boxes("0 0.5 0.5 0.01 0.02\n2 0.5 0.25 0.1 0.2\n\n").unwrap();
+        let (people, balls) = boxes("0 0.5 0.5 0.01 0.02\n2 0.5 0.25 0.1 0.2\n\n", (1280, 720)).unwrap();
         assert_eq!(people, vec![PixelBox { min: DVec2::new(575.5, 107.5), max: DVec2::new(703.5, 251.5) }]);
         assert_eq!(balls.len(), 1);
         for text in ["2 0.5 0.5 0.1", "x 1 1 1 1", "2 0.5 nan 0.1 0.1", "2 0.5 0.5 -0.1 0.1"] {
-            assert!(boxes(text).unwrap_err().contains("line 1"), "{text}");
+            assert!(boxes(text, (1280, 720)).unwrap_err().contains("line 1"), "{text}");
         }
     }
 
     #[test]
     fn a_folder_without_labels_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let error = read(folder.path()).unwrap_err().to_string();
+        let error = read(folder.path(), None).unwrap_err().to_string();
         assert!(error.contains("labels"), "{error}");
         std::fs::create_dir(folder.path().join("labels")).unwrap();
         std::fs::write(folder.path().join("labels/a.b.txt"), "2 0.5 0.5 0.1 0.1").unwrap();
-        let error = read(folder.path()).unwrap_err().to_string();
+        let error = read(folder.path(), None).unwrap_err().to_string();
         assert!(error.contains("a.b"), "{error}");
     }
 }

@@ -7,12 +7,14 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
-use pathfinding::prelude::{Matrix, kuhn_munkres};
 use protocol::chunk::{Body, ChunkFrame};
 use serde::{Deserialize, Serialize};
 
 use super::surface::{Surface, Triangle, spread};
-use crate::report::median;
+use crate::{
+    assignment::{Pair, most_gain},
+    report::{median, quantile},
+};
 
 /// People farther apart than this on the pitch are not the same person, metres.
 pub const MATCH_RADIUS_M: f64 = 1.5;
@@ -96,8 +98,6 @@ impl Tally {
 
     fn figures(&self) -> MatchFigures {
         let matched = self.positions_m.len();
-        let mut sorted = self.positions_m.clone();
-        sorted.sort_by(f64::total_cmp);
         let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
         MatchFigures {
             frames: self.frames,
@@ -107,8 +107,9 @@ impl Tally {
             coverage: share(matched, self.true_people),
             false_share: share(self.our_people - matched, self.our_people),
             position_error_median_m: median(&self.positions_m),
-            position_error_mean_m: (matched > 0).then(|| sorted.iter().sum::<f64>() / matched as f64),
-            position_error_p90_m: sorted.get((matched * 9).div_ceil(10).saturating_sub(1)).copied(),
+            position_error_mean_m: (matched > 0)
+                .then(|| self.positions_m.iter().sum::<f64>() / matched as f64),
+            position_error_p90_m: quantile(&self.positions_m, 0.9),
             surface_distance_median_m: median(&self.distances_m),
             surface_distance_placed_median_m: median(&self.placed_m),
             surface_gap_median_m: median(&self.gaps_m),
@@ -136,24 +137,20 @@ fn mean_distance(points: &[DVec3], surface: &Surface) -> Option<f64> {
 }
 
 /// Index pairs (true, ours) of the same people.
-fn pairs(truth: &[Body], ours: &[Body]) -> Vec<(usize, usize)> {
-    if truth.is_empty() || ours.is_empty() {
-        return Vec::new();
+pub(super) fn pairs(truth: &[Body], ours: &[Body]) -> Vec<(usize, usize)> {
+    // One more pair weighs more than any saving of distance, so the number of pairs comes first.
+    const PAIR: f64 = 1_000.0;
+    let mut near = Vec::new();
+    for (row, truth) in truth.iter().enumerate() {
+        for (column, ours) in ours.iter().enumerate() {
+            let distance_m = on_pitch(truth).distance(on_pitch(ours));
+            if distance_m <= MATCH_RADIUS_M {
+                near.push(Pair { row, column, gain: PAIR - distance_m });
+            }
+        }
     }
-    // One more pair weighs more than any saving of distance, so the number of pairs comes first. Millimetres as integers.
-    const PAIR: i64 = 1_000_000;
-    let near = |t: usize, o: usize| {
-        let distance_m = on_pitch(&truth[t]).distance(on_pitch(&ours[o]));
-        (distance_m <= MATCH_RADIUS_M).then_some(distance_m)
-    };
-    let size = truth.len().max(ours.len());
-    let weights = Matrix::from_fn(size, size, |(t, o)| {
-        let inside = t < truth.len() && o < ours.len();
-        inside.then(|| near(t, o)).flatten().map_or(0, |distance_m| PAIR - (distance_m * 1_000.0) as i64)
-    });
-    let (_, ours_of) = kuhn_munkres(&weights);
-    let all = ours_of.into_iter().enumerate();
-    all.filter(|&(t, o)| t < truth.len() && o < ours.len() && near(t, o).is_some()).collect()
+    let ours_of = most_gain(truth.len(), ours.len(), &near).into_iter().enumerate();
+    ours_of.filter_map(|(row, column)| Some((row, column?))).collect()
 }
 
 #[cfg(test)]

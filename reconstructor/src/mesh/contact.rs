@@ -1,4 +1,5 @@
-//! The body stands on the pitch: a small vertical correction brings its lowest part to y = 0.
+//! The body stands on the pitch: a small vertical correction brings its lowest part to y = 0, or, of somebody who jumps, to
+//! the height of the jump.
 
 use glam::DVec3;
 
@@ -16,8 +17,15 @@ const FOOT_JOINTS: std::ops::RangeInclusive<usize> = 27..=32;
 /// Feet are missing from the mask when it ends this far above the lowest foot joint, metres.
 const FOOT_MISSING_M: f64 = 0.12;
 
-/// How far up (+) to move the body so that it stands on y = 0, metres, at most [`MAX_CORRECTION_M`] either way.
-pub(super) fn correction(points_m: &[DVec3], person: &Person, plane: &VirtualPlane, footprint_m: f64) -> f64 {
+/// How far up (+) to move the body so that its lowest part is `above_ground_m` over the pitch, metres, at most
+/// [`MAX_CORRECTION_M`] either way.
+pub(super) fn correction(
+    points_m: &[DVec3],
+    person: &Person,
+    plane: &VirtualPlane,
+    footprint_m: f64,
+    above_ground_m: f64,
+) -> f64 {
     let mut heights: Vec<f64> = points_m.iter().map(|point| point.y).collect();
     heights.sort_by(f64::total_cmp);
     let Some(&sole_m) = heights.get((heights.len() as f64 * STRAY_SHARE) as usize) else { return 0.0 };
@@ -35,5 +43,5 @@ pub(super) fn correction(points_m: &[DVec3], person: &Person, plane: &VirtualPla
         Some(joint_m) if sole_m > joint_m + FOOT_MISSING_M.max(2.0 * footprint_m) => joint_m,
         _ => sole_m,
     };
-    (-contact_m).clamp(-MAX_CORRECTION_M, MAX_CORRECTION_M)
+    (above_ground_m - contact_m).clamp(-MAX_CORRECTION_M, MAX_CORRECTION_M)
 }

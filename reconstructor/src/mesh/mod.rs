@@ -35,6 +35,25 @@ pub struct BodySurface {
     pub confidence: f32,
 }
 
+/// Whose surface is lifted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figure {
+    /// Who.
+    pub person: PersonId,
+    /// Index in `ClipInfo::frames`.
+    pub frame: usize,
+    /// Height of the lowest point of the body over the pitch, metres; 0 of who stands.
+    pub above_ground_m: f64,
+}
+
+impl Figure {
+    /// Somebody who stands.
+    #[must_use]
+    pub fn standing(person: PersonId, frame: usize) -> Self {
+        Self { person, frame, above_ground_m: 0.0 }
+    }
+}
+
 /// How much a mesh may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshBudget {
@@ -113,7 +132,8 @@ impl VirtualPlane {
 
 /// Lifts a player's pixels to a textured mesh on the pitch.
 ///
-/// `image` is the frame that `depth` was estimated on. The mesh stands on the pitch: see [`MAX_CORRECTION_M`].
+/// `image` is the frame that `depth` was estimated on. The mesh stands on the pitch, or as high above it as `figure` says: see
+/// [`MAX_CORRECTION_M`].
 /// Triangles are counter-clockwise seen from the camera.
 ///
 /// # Errors
@@ -121,8 +141,7 @@ impl VirtualPlane {
 pub fn lift(
     image: &RgbImage,
     camera: &Camera,
-    person_id: PersonId,
-    frame: usize,
+    figure: Figure,
     person: &Person,
     depth: &DepthMap,
     budget: &MeshBudget,
@@ -132,7 +151,8 @@ pub fn lift(
     let footprint_m = 1.0 / camera.pixels_per_metre(anchor_m);
     let mut surface = grid::connect(depth, &plane, footprint_m)?;
     surface.keep_large_pieces()?;
-    let correction_m = contact::correction(&surface.points_m, person, &plane, footprint_m);
+    let correction_m =
+        contact::correction(&surface.points_m, person, &plane, footprint_m, figure.above_ground_m);
     let texture = texture::cut_out(image, &depth.mask, &surface.pixels);
     let positions_m = surface
         .points_m
@@ -142,8 +162,8 @@ pub fn lift(
     let uvs = surface.pixels.iter().map(|pixel| texture.uv(*pixel)).collect();
     let mesh = Mesh { positions_m, uvs, triangles: surface.triangles };
     Ok(BodySurface {
-        person: person_id,
-        frame,
+        person: figure.person,
+        frame: figure.frame,
         anchor_m,
         mesh: decimate::to_budget(mesh, budget.triangles),
         texture: texture.image,

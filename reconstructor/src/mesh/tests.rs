@@ -6,7 +6,7 @@ use protocol::{camera::Camera, manifest::PersonId};
 
 use super::*;
 use crate::{
-    geometry::{Mask, PixelBox},
+    geometry::Mask,
     pose::{JOINTS, Joint, Person},
 };
 
@@ -20,14 +20,11 @@ fn camera() -> Camera {
 fn person_at(ground_m: DVec3) -> Person {
     let joint = Joint { pixel: DVec2::ZERO, depth_m: 0.0, visibility: 0.0 };
     Person {
-        bounds: PixelBox { min: DVec2::ZERO, max: DVec2::ONE },
-        score: 0.9,
         pose_score: 0.8,
         joints: vec![joint; JOINTS],
-        mask: Mask::default(),
-        neck_px: DVec2::ZERO,
         ground_m,
         neck_m: ground_m + DVec3::Y * 1.5,
+        ..Person::blank()
     }
 }
 
@@ -93,8 +90,15 @@ fn a_cylinder_comes_back_within_a_centimetre() {
     let anchor_m = DVec3::new(10.0, 0.0, 8.0);
     let (depth, image) = photograph(&camera, anchor_m, |ray| cylinder(ray, anchor_m, 0.3, 1.8));
     let person = person_at(anchor_m);
-    let surface =
-        lift(&image, &camera, PersonId(3), 7, &person, &depth, &MeshBudget { triangles: 100_000 }).unwrap();
+    let surface = lift(
+        &image,
+        &camera,
+        Figure::standing(PersonId(3), 7),
+        &person,
+        &depth,
+        &MeshBudget { triangles: 100_000 },
+    )
+    .unwrap();
     let points = world(&surface);
     assert!(points.len() > 2_000, "{} points", points.len());
     // The outline is where the ray only grazes the surface: its depth is its inner neighbour's.
@@ -126,7 +130,9 @@ fn a_sphere_keeps_its_shape_under_a_budget() {
     let (depth, image) = photograph(&camera, anchor_m, sphere);
     for triangles in [1_000, 300] {
         let budget = MeshBudget { triangles };
-        let surface = lift(&image, &camera, PersonId(0), 0, &person_at(anchor_m), &depth, &budget).unwrap();
+        let surface =
+            lift(&image, &camera, Figure::standing(PersonId(0), 0), &person_at(anchor_m), &depth, &budget)
+                .unwrap();
         assert!(surface.mesh.triangles.len() <= triangles);
         assert!(surface.mesh.triangles.len() * 10 >= triangles * 9, "the budget is used");
         // The ball's lowest point is hidden under it, so the body is set down by a little: judge the shape without that.
@@ -150,8 +156,7 @@ fn triangles_face_the_camera_and_the_texture_shows_no_grass() {
     let surface = lift(
         &image,
         &camera,
-        PersonId(0),
-        0,
+        Figure::standing(PersonId(0), 0),
         &person_at(anchor_m),
         &depth,
         &MeshBudget { triangles: 100_000 },
@@ -176,8 +181,15 @@ fn texture_coordinates_point_at_the_pixel_a_vertex_was_seen_in() {
     let camera = camera();
     let anchor_m = DVec3::new(10.0, 0.0, 8.0);
     let (depth, image) = photograph(&camera, anchor_m, |ray| cylinder(ray, anchor_m, 0.3, 1.8));
-    let surface =
-        lift(&image, &camera, PersonId(0), 0, &person_at(anchor_m), &depth, &MeshBudget::default()).unwrap();
+    let surface = lift(
+        &image,
+        &camera,
+        Figure::standing(PersonId(0), 0),
+        &person_at(anchor_m),
+        &depth,
+        &MeshBudget::default(),
+    )
+    .unwrap();
     let size = DVec2::new(f64::from(surface.texture.width()), f64::from(surface.texture.height()));
     let pixels: Vec<DVec2> = world(&surface).iter().map(|p| camera.project(*p).unwrap()).collect();
     let shift = |i: usize| {
@@ -202,8 +214,7 @@ fn a_jump_in_depth_is_cut() {
     let surface = lift(
         &image,
         &camera,
-        PersonId(0),
-        0,
+        Figure::standing(PersonId(0), 0),
         &person_at(anchor_m),
         &depth,
         &MeshBudget { triangles: 100_000 },
@@ -228,7 +239,14 @@ fn broken_depth_maps_are_refused() {
     let image = RgbImage::new(1920, 1080);
     let mask = Mask { x0: 5, y0: 5, width: 10, height: 10, coverage: vec![255; 100] };
     let attempt = |depth: &DepthMap| {
-        lift(&image, &camera, PersonId(0), 0, &person_at(anchor_m), depth, &MeshBudget::default())
+        lift(
+            &image,
+            &camera,
+            Figure::standing(PersonId(0), 0),
+            &person_at(anchor_m),
+            depth,
+            &MeshBudget::default(),
+        )
     };
     let short = DepthMap { mask: mask.clone(), offset_m: vec![0.0; 99] };
     assert!(matches!(attempt(&short), Err(MeshError::Sizes { .. })));
@@ -238,6 +256,7 @@ fn broken_depth_maps_are_refused() {
     assert!(matches!(attempt(&empty), Err(MeshError::TooSmall { triangles: 0 })));
     let above = person_at(camera.position.with_y(0.0));
     let depth = DepthMap { mask: Mask::default(), offset_m: Vec::new() };
-    let lifted = lift(&image, &camera, PersonId(0), 0, &above, &depth, &MeshBudget::default());
+    let lifted =
+        lift(&image, &camera, Figure::standing(PersonId(0), 0), &above, &depth, &MeshBudget::default());
     assert!(matches!(lifted, Err(MeshError::NoPlane)));
 }

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{
     calibration::CalibrationError, depth::DepthError, detection::DetectionError, encode::EncodeError,
-    inference::InferenceError, ingest::IngestError, pose::PoseError,
+    inference::InferenceError, ingest::IngestError, pose::PoseError, segmentation::SegmentationError,
 };
 
 /// Why a clip was not reconstructed.
@@ -35,6 +35,9 @@ pub enum PipelineError {
     /// The pose network failed.
     #[error(transparent)]
     Pose(#[from] PoseError),
+    /// The mask network failed.
+    #[error(transparent)]
+    Segmentation(#[from] SegmentationError),
     /// The depth network failed.
     #[error(transparent)]
     Depth(#[from] DepthError),

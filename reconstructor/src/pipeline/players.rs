@@ -5,37 +5,46 @@ use std::{
     time::Instant,
 };
 
+use glam::DVec3;
 use protocol::manifest::PersonId;
 
-use super::{PipelineError, kit, run::Run, work::Results};
+use super::{PipelineError, run::Run, work::Results};
 use crate::{
     calibration::CameraEstimate,
     depth::{self, DepthError, DepthEstimator, DepthMap},
     geometry::Mask,
-    pose::Person,
+    pose::{POSE_SCORE_MIN, Person},
     report::{Failure, Loss, Stage},
-    segmentation::{self, InstanceMaskSegmenter, PlayerMask},
-    tracking::{self, Track},
-    trajectory::Path,
+    segmentation::{self, FrameSeen, PlayerMask, RefiningSegmenter, Segmenter},
+    teams::{self, Member},
+    tracking::{self, Sighting, Track, across::Clip},
+    trajectory::{self, Path, Smoothing},
 };
 
-/// A depth map, or why there is none, and the shirt's colour.
-pub(super) type PersonDepth = (Result<DepthMap, String>, Option<[u8; 3]>);
+/// A depth map, or why there is none.
+pub(super) type PersonDepth = Result<DepthMap, String>;
 
 /// The masks of a frame: whose, which of the frame's people, which pixels.
 pub(super) type FrameMasks<'a> = BTreeMap<PersonId, &'a PlayerMask>;
 
-/// Where the depth maps are, and what was learnt with them.
-pub(super) struct Depths {
-    pub(super) results: Results,
-    pub(super) shirts: BTreeMap<PersonId, [u8; 3]>,
-}
-
 impl Run<'_> {
-    /// Who is who.
-    pub(super) fn track(&mut self, people: &[Vec<Person>]) -> Result<Vec<Track>, PipelineError> {
+    /// Who is who, and on whose side.
+    pub(super) fn track(
+        &mut self,
+        people: &[Vec<Person>],
+        cameras: &[CameraEstimate],
+    ) -> Result<(Vec<Track>, Vec<Member>), PipelineError> {
         let started = Instant::now();
-        let tracks = tracking::track_shots(people, self.clip.info(), &self.shots, &self.options.tracking);
+        let (info, limits) = (self.clip.info(), &self.options.tracking);
+        let tracks = tracking::track_shots(people, cameras, info, &self.shots, limits);
+        let tracks = teams::on_the_pitch(tracks, people, &self.pitch);
+        let (tracks, members) = if limits.over_cuts {
+            let clip = Clip { people, cameras, info, shots: &self.shots };
+            teams::join_tracks(&tracks, &clip, &self.pitch)
+        } else {
+            let members = teams::assign(&tracks, people, &self.pitch);
+            (tracks, members)
+        };
         self.reporter.stage_done(Stage::Tracking, started.elapsed(), 0);
         if tracks.is_empty() {
             return Err(PipelineError::Nobody {
@@ -44,13 +53,72 @@ impl Run<'_> {
                 seen: people.iter().map(Vec::len).sum(),
             });
         }
-        Ok(tracks)
+        Ok((tracks, members))
+    }
+
+    /// Smooths poses along the tracks. Who has no pose of its own is noted: mended from the frames around, or left standing.
+    pub(super) fn smooth_poses(
+        &mut self,
+        people: &mut [Vec<Person>],
+        tracks: &[Track],
+        cameras: &[CameraEstimate],
+    ) {
+        let changes = trajectory::smooth_poses(people, tracks, cameras);
+        tracing::info!(
+            "poses: {} with left and right exchanged, {} made from those before and after, {} joints set right",
+            changes.exchanged,
+            changes.filled.len(),
+            changes.outliers
+        );
+        let filled: BTreeSet<Sighting> = changes.filled.into_iter().collect();
+        for track in tracks {
+            for sighting in &track.sightings {
+                let person = people.get(sighting.frame).and_then(|frame| frame.get(sighting.person_index));
+                if person.is_none_or(|person| person.pose_score >= POSE_SCORE_MIN) {
+                    continue;
+                }
+                let instead = match filled.contains(sighting) {
+                    true => "that of the frames around is shown",
+                    false => "a standing figure is shown",
+                };
+                let reason = format!("no readable pose: {instead}");
+                let (stage, loss, person) = (Stage::Pose, Loss::Fallback, Some(track.person.0));
+                self.reporter.note(Failure {
+                    stage,
+                    loss,
+                    frame: self.clip_frame(sighting.frame),
+                    person,
+                    reason,
+                });
+            }
+        }
     }
 
     /// Which pixels belong to whom.
-    pub(super) fn segment(&mut self, people: &[Vec<Person>], tracks: &[Track]) -> Vec<PlayerMask> {
-        let started = Instant::now();
-        let masks = segmentation::segment(people, tracks, &mut InstanceMaskSegmenter);
+    pub(super) fn segment(
+        &mut self,
+        people: &[Vec<Person>],
+        tracks: &[Track],
+    ) -> Result<Vec<PlayerMask>, PipelineError> {
+        let settings = format!("{:?}", self.options.tracking);
+        let results = self.results(Stage::Segmentation, segmentation::MODEL, &[settings.as_bytes()])?;
+        let followed = segmentation::followed(tracks, people.len());
+        let wanted: Vec<bool> = followed.iter().map(|followed| !followed.is_empty()).collect();
+        let found = self.per_frame(
+            Stage::Segmentation,
+            &results,
+            &wanted,
+            // It looks at each frame alone, so frames may come to several of them in any order.
+            || Ok(RefiningSegmenter::load()?),
+            |segmenter, frame| {
+                let (people, followed) = (people.get(frame.index), followed.get(frame.index));
+                let (Some(people), Some(followed)) = (people, followed) else { return Ok(Vec::new()) };
+                let seen = FrameSeen { index: frame.index, picture: &frame.image, people, followed };
+                Ok(segmenter.push(&seen)?)
+            },
+        )?;
+        let masks = found.into_iter().flatten().flatten().collect();
+        let masks: Vec<PlayerMask> = segmentation::settled(masks, people).into_values().flatten().collect();
         let kept: BTreeSet<(usize, usize)> =
             masks.iter().map(|mask| (mask.sighting.frame, mask.sighting.person_index)).collect();
         for track in tracks {
@@ -61,8 +129,7 @@ impl Run<'_> {
                 self.reporter.note(Failure { stage, loss: Loss::LeftOut, frame, person, reason });
             }
         }
-        self.reporter.stage_done(Stage::Segmentation, started.elapsed(), 0);
-        masks
+        Ok(masks)
     }
 
     /// The depth map of every mask; they stay in the work folder.
@@ -71,7 +138,7 @@ impl Run<'_> {
         cameras: &[CameraEstimate],
         people: &[Vec<Person>],
         masks: &[FrameMasks<'_>],
-    ) -> Result<Depths, PipelineError> {
+    ) -> Result<Results, PipelineError> {
         let settings = format!("{:?}", self.options.tracking);
         let results = self.results(Stage::Depth, depth::MODEL_NAME, &[settings.as_bytes()])?;
         let wanted: Vec<bool> = masks.iter().map(|masks| !masks.is_empty()).collect();
@@ -92,15 +159,13 @@ impl Run<'_> {
                         Err(error @ DepthError::Inference(_)) => return Err(error.into()),
                         Err(error) => Err(error.to_string()),
                     };
-                    all.insert(id.0, (map, kit::shirt_rgb(&frame.image, found, mask)));
+                    all.insert(id.0, map);
                 }
                 Ok(all)
             },
         )?;
-        let mut colours: BTreeMap<PersonId, Vec<[u8; 3]>> = BTreeMap::new();
         for (index, frame) in depths.into_iter().enumerate() {
-            for (person, (map, shirt)) in frame.unwrap_or_default() {
-                colours.entry(PersonId(person)).or_default().extend(shirt);
+            for (person, map) in frame.unwrap_or_default() {
                 if let Err(reason) = map {
                     let (stage, frame) = (Stage::Depth, self.clip_frame(index));
                     self.reporter.note(Failure {
@@ -113,25 +178,33 @@ impl Run<'_> {
                 }
             }
         }
-        let shirts =
-            colours.iter().filter_map(|(id, samples)| Some((*id, kit::middle_rgb(samples)?))).collect();
-        Ok(Depths { results, shirts })
+        Ok(results)
     }
 
     /// The smooth path of everybody. Paths need only the anchors, so they are solved before the surfaces are lifted, and
     /// each surface is moved as it comes: no more than a few frames of surfaces are in memory.
-    pub(super) fn smooth(&mut self, people: &[Vec<Person>], tracks: &[Track]) -> BTreeMap<PersonId, Path> {
+    pub(super) fn smooth(
+        &mut self,
+        people: &[Vec<Person>],
+        tracks: &[Track],
+        smoothing: Smoothing,
+    ) -> BTreeMap<PersonId, Path> {
         let started = Instant::now();
         let info = self.clip.info();
         let seconds: f64 = info.frames.iter().map(|frame| info.timescale.seconds(frame.duration)).sum();
-        let weight = self.options.smoothing.weight(info.frames.len() as f64 / seconds.max(1e-3));
+        let weight = smoothing.weight(info.frames.len() as f64 / seconds.max(1e-3));
         let mut paths = BTreeMap::new();
         for track in tracks {
             let anchors = track.sightings.iter().filter_map(|sighting| {
                 let person = people.get(sighting.frame)?.get(sighting.person_index)?;
                 Some((sighting.frame, person.ground_m))
             });
-            match Path::through(&anchors.collect(), weight) {
+            // Smoothing ends with the shot: the next camera errs in another way.
+            let mut by_shot: BTreeMap<Option<usize>, BTreeMap<usize, DVec3>> = BTreeMap::new();
+            for (frame, anchor_m) in anchors {
+                by_shot.entry(self.shots.shot_of(frame)).or_default().insert(frame, anchor_m);
+            }
+            match Path::through_parts(by_shot.values(), weight) {
                 Ok(path) => {
                     paths.insert(track.person, path);
                 }

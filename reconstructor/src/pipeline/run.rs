@@ -7,13 +7,13 @@ use protocol::pitch::Pitch;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::{
-    PipelineError, ReconstructOptions,
+    ObserveOptions, PipelineError,
     frames::each_frame,
     work::{Fingerprint, Results, WorkFolder},
 };
 use crate::{
     calibration::{self, CameraEstimate, ClipCameras, Finders, Given, Known},
-    detection::{self, Detection, Detector},
+    detection::{self, Detection, Detector, Found},
     inference,
     ingest::{Clip, Frame},
     pose::{self, Person, PoseEstimator},
@@ -21,9 +21,9 @@ use crate::{
     shots::{self, ShotList},
 };
 
-/// A reconstruction under way.
+/// A clip that is being looked at, and then reconstructed.
 pub(super) struct Run<'a> {
-    pub(super) options: &'a ReconstructOptions,
+    pub(super) options: &'a ObserveOptions,
     pub(super) reporter: &'a mut Reporter,
     pub(super) clip: Clip,
     pub(super) pitch: Pitch,
@@ -37,7 +37,7 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     /// Opens everything that can be wrong before the long work begins.
     pub(super) fn open(
-        options: &'a ReconstructOptions,
+        options: &'a ObserveOptions,
         reporter: &'a mut Reporter,
     ) -> Result<Self, PipelineError> {
         let started = Instant::now();
@@ -50,9 +50,6 @@ impl<'a> Run<'a> {
             path: options.calibration.clone().unwrap_or_default(),
             source: Box::new(source),
         })?;
-        // A folder that cannot be written is known now, not after the long work.
-        std::fs::create_dir_all(&options.out)
-            .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
         let fingerprint = Fingerprint::of_clip(&options.clip)
             .map_err(|source| PipelineError::Work { doing: "read", path: options.clip.clone(), source })?
             .with_program()?;
@@ -140,8 +137,8 @@ impl<'a> Run<'a> {
         if read < expected { Err(PipelineError::FramesMissing { clip, read, expected }) } else { Ok(()) }
     }
 
-    /// People in every frame.
-    pub(super) fn detect(&mut self) -> Result<Vec<Vec<Detection>>, PipelineError> {
+    /// People and what may be the ball, in every frame.
+    pub(super) fn detect(&mut self) -> Result<Vec<Found>, PipelineError> {
         let results = self.results(Stage::Detection, detection::MODEL, &[])?;
         // Between shots there is no camera, so nobody could be placed.
         let wanted: Vec<bool> =

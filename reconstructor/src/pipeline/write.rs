@@ -13,31 +13,38 @@ use protocol::{
 
 use super::{
     PipelineError,
+    air::{self, Heights},
     frames::each_frame,
-    players::{Depths, FrameMasks, PersonDepth, of_frame},
+    players::{FrameMasks, PersonDepth, of_frame},
     run::Run,
+    work::Results,
 };
 use crate::{
+    ball::BallEstimate,
     calibration::CameraEstimate,
     detection::Detection,
     encode::{StreamFrame, StreamHeader, StreamWriter},
     ingest::Clip,
-    mesh::{self, BodySurface},
+    mesh::{self, BodySurface, Figure, MeshBudget},
     pose::Person,
     report::{Failure, FrameFigures, Loss, Progress, Stage},
-    tracking::Track,
+    teams::Member,
     trajectory::{self, Path},
 };
 
 /// All that the last stages need.
 pub(super) struct Scene<'a> {
+    pub(super) out: &'a std::path::Path,
+    pub(super) budget: MeshBudget,
     pub(super) detections: &'a [Vec<Detection>],
     pub(super) cameras: &'a [CameraEstimate],
     pub(super) people: &'a [Vec<Person>],
-    pub(super) tracks: &'a [Track],
+    pub(super) members: &'a [Member],
     pub(super) masks: &'a [FrameMasks<'a>],
-    pub(super) depths: &'a Depths,
+    pub(super) depths: &'a Results,
     pub(super) paths: &'a BTreeMap<PersonId, Path>,
+    pub(super) ball: &'a [Option<BallEstimate>],
+    pub(super) heights_m: &'a Heights,
 }
 
 impl Run<'_> {
@@ -47,12 +54,12 @@ impl Run<'_> {
         let wanted: Vec<bool> = scene.cameras.iter().map(|estimate| estimate.camera.is_some()).collect();
         let progress = self.reporter.progress(Stage::Mesh, wanted.iter().filter(|wanted| **wanted).count());
         let mut writing = Writing {
-            writer: StreamWriter::create(&self.options.out, &self.header(scene))?,
+            writer: StreamWriter::create(scene.out, &self.header(scene))?,
             figures: self.figures(scene),
             failures: Vec::new(),
             encode: Duration::ZERO,
         };
-        let budget = self.options.budget;
+        let budget = scene.budget;
         let read = each_frame(
             || self.clip.frames(),
             self.options.threads,
@@ -60,12 +67,13 @@ impl Run<'_> {
             || Ok(()),
             |(), frame| {
                 let camera = scene.cameras.get(frame.index).and_then(|estimate| estimate.camera);
-                let depths: BTreeMap<u32, PersonDepth> =
-                    scene.depths.results.load(frame.index).unwrap_or_default();
+                let depths: BTreeMap<u32, PersonDepth> = scene.depths.load(frame.index).unwrap_or_default();
                 let mut lifted = Vec::new();
                 for (id, found, _) in of_frame(frame.index, scene.masks, scene.people) {
-                    if let (Some(camera), Some((Ok(map), _))) = (&camera, depths.get(&id.0)) {
-                        let body = mesh::lift(&frame.image, camera, id, frame.index, found, map, &budget);
+                    if let (Some(camera), Some(Ok(map))) = (&camera, depths.get(&id.0)) {
+                        let above_ground_m = scene.heights_m.get(&(frame.index, id)).copied().unwrap_or(0.0);
+                        let figure = Figure { person: id, frame: frame.index, above_ground_m };
+                        let body = mesh::lift(&frame.image, camera, figure, found, map, &budget);
                         lifted.push((id, body.map_err(|error| error.to_string())));
                     }
                 }
@@ -88,12 +96,15 @@ impl Run<'_> {
     }
 
     fn header(&self, scene: &Scene<'_>) -> StreamHeader {
-        let people = scene.tracks.iter().map(|track| StreamPerson {
-            id: track.person,
-            team: None,
-            role: None,
+        let people = scene.members.iter().map(|member| StreamPerson {
+            id: member.person,
+            team: member.team.map(|team| team.name().to_owned()),
+            team_confidence: member.team.map(|_| member.team_confidence as f32),
+            role_confidence: member.role.map(|_| member.role_confidence as f32),
+            role: member.role.map(|role| role.name().to_owned()),
             number: None,
-            shirt_rgb: scene.depths.shirts.get(&track.person).copied(),
+            number_confidence: None,
+            shirt_rgb: member.shirt_rgb,
         });
         StreamHeader {
             timescale: self.clip.info().timescale,
@@ -200,7 +211,7 @@ impl Writing {
                 line_residual_px: figures.line_residual_median_px.map(|residual| residual as f32),
                 track_confidence: figures.track_confidence_mean.map(|confidence| confidence as f32),
             },
-            ball: None,
+            ball: scene.ball.get(index).copied().flatten().map(air::in_stream),
             surfaces,
         })?;
         self.encode += started.elapsed();

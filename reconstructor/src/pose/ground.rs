@@ -7,10 +7,16 @@ use glam::{DVec2, DVec3};
 use protocol::{camera::Camera, pitch::Pitch};
 
 use super::{Joint, index};
-use crate::geometry::PixelBox;
+use crate::{detection::Detection, geometry::PixelBox};
 
 /// People stand at most this far outside the lines (assistants, throw-ins), metres.
 pub(super) const MARGIN_M: f64 = 3.0;
+/// Nearer to the lines than this, or outside them, looks tell who is in the match, metres.
+const LOOKS_MARGIN_M: f64 = 0.5;
+/// Assistants run along the lines and throw-ins are taken behind them, at most this far outside, metres.
+const BESIDE_MARGIN_M: f64 = 1.5;
+/// Height of the lowest pixels of a foot above the grass, metres.
+const FOOT_M: f64 = 0.03;
 /// Height above the pitch at which the network sees ankle, heel and toe of the lower foot, metres. Larger than a standing
 /// foot's (0.10, 0.07, 0.03 with boots): a runner's lower foot is in the air half of the time, and the network sets the
 /// ankle high. Measured on rendered players (700 sightings); the anatomical heights put them 0.2 m too far away.
@@ -26,26 +32,43 @@ const HIP_M: f64 = 0.9;
 /// A foot whose line of sight meets the pitch this much farther than the other's is in the air, metres.
 const BOTH_STAND_M: f64 = 0.25;
 /// Top of the head above the pitch that a player can have: lying or tackling to jumping.
-const HEAD_M: std::ops::RangeInclusive<f64> = 0.7..=2.6;
+pub(super) const HEAD_M: std::ops::RangeInclusive<f64> = 0.7..=2.6;
 /// Height of a box lifted on the pitch, before the pose is known; boxes are rough.
 const BOX_M: std::ops::RangeInclusive<f64> = 0.6..=3.2;
 
-/// The upright plane through `ground_m` that faces the camera.
-fn upright_plane(camera: &Camera, ground_m: DVec3) -> (DVec3, DVec3) {
-    let to_camera = (camera.position - ground_m) * DVec3::new(1.0, 0.0, 1.0);
-    (ground_m, to_camera.normalize_or(DVec3::Z))
+/// The horizontal direction from `ground_m` to the camera: the normal of the upright plane there that faces it.
+pub(crate) fn upright_normal(camera: &Camera, ground_m: DVec3) -> DVec3 {
+    (camera.position - ground_m).with_y(0.0).normalize_or(DVec3::Z)
 }
 
 /// A pixel lifted on the upright plane through `ground_m`.
-pub(super) fn lift(camera: &Camera, pixel: DVec2, ground_m: DVec3) -> Option<DVec3> {
-    let (point, normal) = upright_plane(camera, ground_m);
-    camera.ray(pixel).on_plane(point, normal)
+pub(crate) fn lift(camera: &Camera, pixel: DVec2, ground_m: DVec3) -> Option<DVec3> {
+    camera.ray(pixel).on_plane(ground_m, upright_normal(camera, ground_m))
+}
+
+/// Whether a detection can be of somebody in the match: in a box that may stand on the pitch, and not somebody beside it.
+pub(super) fn may_play(camera: &Camera, pitch: &Pitch, found: &Detection) -> bool {
+    if !box_may_stand(camera, pitch, &found.bounds) {
+        return false;
+    }
+    let Some(ground) = under_box(camera, &found.bounds) else { return false };
+    let within = |margin_m: f64| pitch.contains(DVec2::new(ground.x, ground.z), margin_m);
+    // Looks decide only near the lines: nobody but players and officials is farther in. Coaches look like officials or
+    // players, but stand farther from the lines than assistants do.
+    within(-LOOKS_MARGIN_M) || (within(BESIDE_MARGIN_M) && found.roles.bystander < 0.5)
+}
+
+/// The point of the pitch under the lower end of a box.
+pub(super) fn under_box(camera: &Camera, bounds: &PixelBox) -> Option<DVec3> {
+    let foot = DVec2::new(bounds.centre().x, bounds.max.y);
+    let ground = camera.ray(foot).at_height(FOOT_M)?;
+    ground.is_finite().then_some(DVec3::new(ground.x, 0.0, ground.z))
 }
 
 /// Whether a detector's box could hold somebody on the pitch; generous, for boxes are rough.
 pub(super) fn box_may_stand(camera: &Camera, pitch: &Pitch, bounds: &PixelBox) -> bool {
     let middle = bounds.centre().x;
-    // Half the box may be missing (a hidden or cut person), or it may hang over: try its lower end, then a little more.
+    // Half the box may be missing (cut by the picture), or it may hang over: try its lower end, then a little more.
     let stands = |y: f64| {
         let foot = DVec2::new(middle, y);
         let Some(ground) = camera.ground_point(foot) else { return false };
@@ -57,7 +80,7 @@ pub(super) fn box_may_stand(camera: &Camera, pitch: &Pitch, bounds: &PixelBox) -
 }
 
 /// The point of the pitch under the middle of the hips, or `None` when the pose cannot be that of somebody on the pitch.
-pub(super) fn stand(camera: &Camera, pitch: &Pitch, joints: &[Joint]) -> Option<DVec3> {
+pub(crate) fn stand(camera: &Camera, pitch: &Pitch, joints: &[Joint]) -> Option<DVec3> {
     let hip = middle(joints, index::LEFT_HIP, index::RIGHT_HIP)?;
     let feet: Vec<(f64, f64)> =
         FOOT_JOINTS.iter().filter_map(|foot| hip_depth_from_foot(camera, joints, foot)).collect();

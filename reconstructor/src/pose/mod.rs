@@ -1,21 +1,26 @@
 //! Section 4.2, second half: the pose and the instance mask of everybody who can stand on the pitch.
 //!
-//! Boxes that cannot hold a person on the pitch go first; the pose network then looks at each of the others, and its
-//! verdict, the feet and the height on the pitch decide who stays. Skeletons that coincide are one person.
+//! Boxes that cannot hold a person on the pitch, and people beside it who are not in the match, go first. The pose network
+//! then looks at each of the others; what it is unsure of stays when the detection is clear, as a standing figure in its box
+//! (`pose_score` 0), and goes when it is not. Skeletons that coincide are one person.
 
 mod blazepose;
 mod ground;
+mod looks;
 mod silhouette;
+mod standing;
 
 use glam::{DVec2, DVec3};
 use image::RgbImage;
 use protocol::{camera::Camera, pitch::Pitch};
 use serde::{Deserialize, Serialize};
 
-pub(crate) use silhouette::{bones, cut};
+pub(crate) use ground::{lift as lift_upright, stand, upright_normal};
+pub use looks::{Lab, Looks};
+pub(crate) use silhouette::{bones, cut, squared_distance_px};
 
 use crate::{
-    detection::Detection,
+    detection::{Detection, RoleChances},
     geometry::{Mask, PixelBox},
     inference::{InferenceError, Model},
 };
@@ -66,22 +71,26 @@ pub mod index {
 
 /// Boxes that the pose network looks at in one picture, best first: more than stand on a pitch with substitutes
 /// warming up, and a bound on the time that one picture of noise can take.
-const CANDIDATES_MAX: usize = 80;
+const CANDIDATES_MAX: usize = 60;
+/// From this score on a detection is somebody, whatever the pose network says.
+const CLEAR: f32 = 0.5;
 /// Below this the network saw no whole person.
 pub(crate) const POSE_SCORE_MIN: f32 = 0.3;
 /// A mask below this share of the body's box is none.
 const MASK_SHARE_MIN: f64 = 0.08;
 /// Below this score, or with the hips more than this part of the square from its middle, a second look is taken from
 /// there.
-const SURE: f32 = 0.7;
-const OFF_CENTRE: f64 = 0.06;
+const SURE: f32 = 0.5;
+const OFF_CENTRE: f64 = 0.12;
 /// The square of a second look at somebody in a tangle, relative to the first.
 const NARROW: f64 = 0.8;
-/// Sides of further squares, relative to the first, for a clear detection whose pose stays below this score: on hard
-/// poses the network's verdict changes with small changes of the square.
-const OTHER_LOOKS: [f64; 3] = [0.85, 1.25, 1.6];
-const UNSURE: f32 = 0.5;
-const CLEAR_DETECTION: f32 = 0.35;
+/// Share of a box inside another person's above which it may be a part of that person.
+const COVERED: f64 = 0.5;
+/// Sides of further squares, relative to the first, for a clear detection that the network still refuses: on hard poses its
+/// verdict changes with small changes of the square.
+const OTHER_LOOKS: [f64; 3] = [1.25, 0.85, 1.6];
+/// The pose's box replaces the detector's when they agree this much; otherwise a limb or the neighbour was mistaken.
+const BOXES_AGREE_IOU: f64 = 0.7;
 /// Masks that share this part of the smaller one are of the same person if one of them is much shorter (half a body
 /// found again) or the necks are one above the other. Two people in a tangle are about the same height, side by side.
 const SAME_MASK: f64 = 0.7;
@@ -107,7 +116,10 @@ pub struct Person {
     pub bounds: PixelBox,
     /// Detector's confidence 0..1.
     pub score: f32,
-    /// Pose network's confidence that it saw a whole person, 0..1.
+    /// What the person looks to be in this frame.
+    pub roles: RoleChances,
+    /// Pose network's confidence that it saw a whole person, 0..1; 0 when joints and mask are those of a standing figure in
+    /// the detector's box.
     pub pose_score: f32,
     /// The joints, [`JOINTS`] of them.
     pub joints: Vec<Joint>,
@@ -119,6 +131,27 @@ pub struct Person {
     pub ground_m: DVec3,
     /// Neck lifted on the upright plane through `ground_m`, world metres.
     pub neck_m: DVec3,
+    /// Colours and build.
+    pub looks: Looks,
+}
+
+#[cfg(test)]
+impl Person {
+    /// Somebody of whom nothing is known, for tests to fill in.
+    pub(crate) fn blank() -> Self {
+        Self {
+            bounds: PixelBox { min: DVec2::ZERO, max: DVec2::ONE },
+            score: 0.9,
+            roles: RoleChances::UNKNOWN,
+            pose_score: 0.9,
+            joints: Vec::new(),
+            mask: Mask::default(),
+            neck_px: DVec2::ZERO,
+            ground_m: DVec3::ZERO,
+            neck_m: DVec3::ZERO,
+            looks: Looks::default(),
+        }
+    }
 }
 
 /// Joints and mask in one box of a picture.
@@ -182,79 +215,75 @@ impl PoseEstimator {
         pitch: &Pitch,
     ) -> Result<Vec<Person>, PoseError> {
         let mut candidates: Vec<&Detection> =
-            detections.iter().filter(|d| ground::box_may_stand(camera, pitch, &d.bounds)).collect();
+            detections.iter().filter(|found| ground::may_play(camera, pitch, found)).collect();
         candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut people: Vec<Person> = Vec::new();
         for detection in candidates.into_iter().take(CANDIDATES_MAX) {
-            let Some(person) = self.person(picture, detection, camera, pitch)? else { continue };
-            match people.iter_mut().find(|other| same_person(other, &person, camera)) {
-                Some(other) if other.pose_score * other.score < person.pose_score * person.score => {
-                    *other = person
-                }
-                Some(_) => {}
-                None => people.push(person),
+            let square = blazepose::Square::round(&detection.bounds).filter(|_| !picture.is_empty());
+            let Some(square) = square else { continue };
+            // Part of a body found again, or somebody mostly behind another: only a pose of its own makes it a person.
+            let covered = people.iter().any(|other| covers(&other.bounds, &detection.bounds));
+            let clear = detection.score >= CLEAR && !covered;
+            let seen = self.look_again(picture, square, &detection.bounds, clear)?;
+            let fresh = |person: &Person| !people.iter().any(|other| same_person(other, person, camera));
+            let posed = person_from(&seen, detection, camera, pitch).filter(fresh);
+            let unposed = || clear.then(|| standing::in_box(&seen, detection, camera, pitch)).flatten();
+            match posed.or_else(unposed) {
+                Some(person) => people.push(person),
+                None => tracing::trace!(
+                    x = square.centre.x,
+                    y = square.centre.y,
+                    score = detection.score,
+                    "nobody on the pitch"
+                ),
             }
         }
         people.sort_by(|a, b| a.neck_px.x.total_cmp(&b.neck_px.x));
+        // Only now is it known who covers whom.
+        let nose_m = |person: &Person| {
+            Some(ground::lift(camera, person.joints.get(index::NOSE)?.pixel, person.ground_m)?.y)
+        };
+        let all: Vec<Looks> = people
+            .iter()
+            .enumerate()
+            .map(|(place, person)| looks::of(picture, &people, place, nose_m(person)))
+            .collect();
+        people.iter_mut().zip(all).for_each(|(person, looks)| person.looks = looks);
         Ok(people)
     }
 
-    fn person(
-        &mut self,
-        picture: &RgbImage,
-        detection: &Detection,
-        camera: &Camera,
-        pitch: &Pitch,
-    ) -> Result<Option<Person>, PoseError> {
-        let square = blazepose::Square::round(&detection.bounds).filter(|_| !picture.is_empty());
-        let Some(square) = square else { return Ok(None) };
-        let seen = self.look_again(picture, square, detection)?;
-        let person = person_from(seen, detection, camera, pitch);
-        if person.is_none() {
-            tracing::trace!(
-                x = square.centre.x,
-                y = square.centre.y,
-                score = detection.score,
-                "nobody on the pitch"
-            );
-        }
-        Ok(person)
-    }
-
-    /// The best of several looks: most people need one, some a second from their hips, a few wider or narrower ones.
+    /// The best of several looks: most people need one, some a second from their hips or closer up, and who is clearly there
+    /// and yet refused a few more.
     fn look_again(
         &mut self,
         picture: &RgbImage,
         square: blazepose::Square,
-        detection: &Detection,
+        bounds: &PixelBox,
+        clear: bool,
     ) -> Result<blazepose::Estimate, PoseError> {
-        let bounds = &detection.bounds;
-        let mut best = blazepose::estimate(&mut self.model, picture, square)?;
-        if !best.is_of(bounds) {
-            // A wide square in a tangle shows the neighbour as well, and the network may prefer that one.
-            let narrow = blazepose::Square { side: square.side * NARROW, ..square };
-            let narrow = blazepose::estimate(&mut self.model, picture, narrow)?;
-            if narrow.is_of(bounds) {
-                best = narrow;
-            }
-        } else if let Some(hips) = best.hips_px() {
-            let shift = hips.distance(square.centre) / square.side;
-            if shift > OFF_CENTRE || best.score < SURE {
-                let second = blazepose::Square { centre: hips, ..square };
-                let second = blazepose::estimate(&mut self.model, picture, second)?;
-                // What is in the middle is read better than the score says.
-                if second.is_of(bounds) && second.score > best.score - 0.1 {
-                    best = second;
+        let first = blazepose::estimate(&mut self.model, picture, square)?;
+        let again = match first.hips_px() {
+            Some(hips) if first.is_of(bounds) => {
+                let shift = hips.distance(square.centre) / square.side;
+                if shift <= OFF_CENTRE && first.score >= SURE {
+                    return Ok(first);
                 }
+                blazepose::Square { centre: hips, ..square }
             }
-        }
+            // A wide square in a tangle shows the neighbour as well, and the network may prefer that one.
+            _ => blazepose::Square { side: square.side * NARROW, ..square },
+        };
+        let second = blazepose::estimate(&mut self.model, picture, again)?;
+        // What is in the middle is read better than the score says.
+        let better = second.is_of(bounds) && (!first.is_of(bounds) || second.score > first.score - 0.1);
+        let mut best = if better { second } else { first };
         for scale in OTHER_LOOKS {
-            if best.score >= UNSURE || detection.score < CLEAR_DETECTION {
+            if !clear || (best.is_of(bounds) && best.score >= POSE_SCORE_MIN) {
                 break;
             }
             let other = blazepose::Square { side: square.side * scale, ..square };
             let other = blazepose::estimate(&mut self.model, picture, other)?;
-            if other.is_of(bounds) && other.score > best.score {
+            if other.is_of(bounds) && (!best.is_of(bounds) || other.score > best.score) {
                 best = other;
             }
         }
@@ -264,19 +293,20 @@ impl PoseEstimator {
 
 /// A person from what the network saw, if it can be one.
 fn person_from(
-    seen: blazepose::Estimate,
+    seen: &blazepose::Estimate,
     detection: &Detection,
     camera: &Camera,
     pitch: &Pitch,
 ) -> Option<Person> {
-    if seen.score < POSE_SCORE_MIN {
+    if seen.score < POSE_SCORE_MIN || !seen.is_of(&detection.bounds) {
         return None;
     }
     let ground_m = ground::stand(camera, pitch, &seen.joints)?;
     let neck_px = ground::middle(&seen.joints, index::LEFT_SHOULDER, index::RIGHT_SHOULDER)?;
     let neck_m = ground::lift(camera, neck_px, ground_m)?;
     let mask = silhouette::clean(&seen.mask, &seen.joints);
-    let bounds = silhouette::bounds(&mask, &seen.joints)?;
+    let posed = silhouette::bounds(&mask, &seen.joints)?;
+    let bounds = if posed.iou(&detection.bounds) >= BOXES_AGREE_IOU { posed } else { detection.bounds };
     let size = bounds.size();
     if (mask.area_px() as f64) < MASK_SHARE_MIN * size.x * size.y {
         return None;
@@ -284,13 +314,22 @@ fn person_from(
     Some(Person {
         bounds,
         score: detection.score,
+        roles: detection.roles,
         pose_score: seen.score,
-        joints: seen.joints,
+        joints: seen.joints.clone(),
         mask,
         neck_px,
         ground_m,
         neck_m,
+        looks: Looks::default(),
     })
+}
+
+/// Whether `larger` covers most of `bounds`.
+fn covers(larger: &PixelBox, bounds: &PixelBox) -> bool {
+    let area = |b: &PixelBox| b.size().x * b.size().y;
+    let shared = PixelBox { min: larger.min.max(bounds.min), max: larger.max.min(bounds.max) };
+    area(&shared) > COVERED * area(bounds)
 }
 
 /// Whether two skeletons, or two masks, are those of one person.
@@ -351,7 +390,7 @@ mod tests {
         let zero = DVec3::ZERO;
         let bounds = PixelBox { min: DVec2::new(x - 8.0, 0.0), max: DVec2::new(x + 8.0, 60.0) };
         let neck_px = DVec2::new(x, 22.0);
-        Person { bounds, score: 0.5, pose_score: 0.9, joints, mask, neck_px, ground_m: zero, neck_m: zero }
+        Person { bounds, score: 0.5, joints, mask, neck_px, ground_m: zero, neck_m: zero, ..Person::blank() }
     }
 
     #[test]

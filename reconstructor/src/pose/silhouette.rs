@@ -35,6 +35,14 @@ pub(crate) fn bones(joints: &[Joint]) -> Vec<(DVec2, DVec2)> {
     BONES.iter().filter_map(|&(a, b)| Some((joints.get(a)?.pixel, joints.get(b)?.pixel))).collect()
 }
 
+/// Squared distance of a point from a piece of line, pixels².
+pub(crate) fn squared_distance_px(point: DVec2, (from, to): (DVec2, DVec2)) -> f64 {
+    let along = to - from;
+    let length = along.length_squared();
+    let part = if length > 0.0 { ((point - from).dot(along) / length).clamp(0.0, 1.0) } else { 0.0 };
+    point.distance_squared(from + along * part)
+}
+
 /// The mask without pieces that neither a bone crosses nor are large, cut to what is left.
 pub(super) fn clean(mask: &Mask, joints: &[Joint]) -> Mask {
     let (width, height) = (mask.width as usize, mask.height as usize);

@@ -26,6 +26,10 @@ pub enum Stage {
     Pose,
     /// Who is who over time.
     Tracking,
+    /// Who is in the air.
+    Jumps,
+    /// The ball.
+    Ball,
     /// Which pixels belong to whom.
     Segmentation,
     /// Depth map of each player.
@@ -40,12 +44,14 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Ingest,
         Self::Detection,
         Self::Calibration,
         Self::Pose,
         Self::Tracking,
+        Self::Jumps,
+        Self::Ball,
         Self::Segmentation,
         Self::Depth,
         Self::Mesh,
@@ -62,6 +68,8 @@ impl Stage {
             Self::Calibration => "calibration",
             Self::Pose => "pose",
             Self::Tracking => "tracking",
+            Self::Jumps => "jumps",
+            Self::Ball => "ball",
             Self::Segmentation => "segmentation",
             Self::Depth => "depth",
             Self::Mesh => "mesh",
@@ -284,6 +292,15 @@ pub(crate) fn median(values: &[f64]) -> Option<f64> {
     sorted.get(sorted.len() / 2 - 1).map(|lower| (lower + upper) / 2.0)
 }
 
+/// The smallest value that at least a `share` of all does not exceed; `None` of nothing.
+pub(crate) fn quantile(values: &[f64], share: f64) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    // A hair less, so that 0.9 of ten values is the ninth whatever the rounding.
+    let place = (sorted.len() as f64 * share - 1e-9).ceil().max(1.0) as usize - 1;
+    sorted.get(place).copied()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,6 +340,18 @@ mod tests {
         let report = reporter.finish(Vec::new(), 0);
         assert_eq!(report.failures.len(), FAILURES_KEPT);
         assert_eq!(report.failures_not_listed, 3);
+    }
+
+    #[test]
+    fn quantiles_of_few_and_none() {
+        assert_eq!(quantile(&[], 0.9), None);
+        assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.9), Some(3.0));
+        assert_eq!(quantile(&[3.0, 1.0, 2.0], 0.1), Some(1.0));
+        let ten: Vec<f64> = (1..=10).map(f64::from).collect();
+        assert_eq!(
+            (quantile(&ten, 0.9), quantile(&ten, 0.0), quantile(&ten, 1.0)),
+            (Some(9.0), Some(1.0), Some(10.0))
+        );
     }
 
     #[test]

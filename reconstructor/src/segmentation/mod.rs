@@ -1,14 +1,33 @@
 //! Section 4.3: which pixels belong to a tracked player.
 //!
-//! A [`Segmenter`] decides for one track at a time and may look at everybody in every frame. The one here takes the
-//! pose network's instance mask and gives pixels that two people claim to one of them.
+//! Frames pass a [`Segmenter`] once, in order; it keeps what it still needs of them (crops, never whole pictures) and gives masks as soon
+//! as they are decided. The methods of the ablation are the [`Method`]s; `docs/segmentation.md` says how they compare.
 
-use glam::DVec2;
+mod blocks;
+mod crf;
+mod energy;
+mod exclusive;
+mod grid;
+mod lattice;
+mod minimum;
+mod paper;
+mod refine;
+
+use std::collections::BTreeMap;
+
+use image::RgbImage;
+use protocol::manifest::PersonId;
 use serde::{Deserialize, Serialize};
+
+pub use paper::{PaperSegmenter, Parts};
+pub use refine::{MODEL, RefiningSegmenter};
+
+pub use exclusive::exclusive;
 
 use crate::{
     geometry::Mask,
-    pose::{Person, bones, cut},
+    inference::InferenceError,
+    pose::Person,
     tracking::{Sighting, Track},
 };
 
@@ -21,156 +40,161 @@ pub struct PlayerMask {
     pub mask: Mask,
 }
 
-/// A way to find the pixels of tracked people.
-pub trait Segmenter {
-    /// The pixels of one track, a mask per sighting in the order of the track. `people` is everybody who was found in
-    /// each frame; sightings point into it.
-    fn segment(&mut self, people: &[Vec<Person>], track: &Track) -> Vec<PlayerMask>;
+/// One frame as it passes a [`Segmenter`].
+#[derive(Clone, Copy, Debug)]
+pub struct FrameSeen<'a> {
+    /// Index in `ClipInfo::frames`.
+    pub index: usize,
+    /// The picture.
+    pub picture: &'a RgbImage,
+    /// Everybody found in it.
+    pub people: &'a [Person],
+    /// Who of them is followed: whose track, and index in `people`.
+    pub followed: &'a [(PersonId, usize)],
 }
 
-/// The masks of all tracks, track by track; sightings without any pixel are left out.
-#[must_use]
-pub fn segment(people: &[Vec<Person>], tracks: &[Track], segmenter: &mut dyn Segmenter) -> Vec<PlayerMask> {
-    let masks = tracks.iter().flat_map(|track| segmenter.segment(people, track));
-    masks.filter(|found| found.mask.area_px() > 0).collect()
-}
+impl<'a> FrameSeen<'a> {
+    /// Those who are followed: whose track, index in `people`, and the person.
+    fn tracked(&self) -> impl Iterator<Item = (PersonId, usize, &'a Person)> {
+        let people = self.people;
+        self.followed.iter().filter_map(move |&(id, index)| Some((id, index, people.get(index)?)))
+    }
 
-/// The pose network's instance mask, minus the pixels that belong more to somebody else in the frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct InstanceMaskSegmenter;
-
-impl Segmenter for InstanceMaskSegmenter {
-    fn segment(&mut self, people: &[Vec<Person>], track: &Track) -> Vec<PlayerMask> {
-        let mask_of = |sighting: &Sighting| {
-            let frame = people.get(sighting.frame)?;
-            let person = frame.get(sighting.person_index)?;
-            let others = frame.iter().enumerate().filter(|(i, _)| *i != sighting.person_index);
-            let mask = own_pixels(person, others.map(|(_, other)| other));
-            Some(PlayerMask { sighting: *sighting, mask })
-        };
-        track.sightings.iter().filter_map(mask_of).collect()
+    /// Everybody but one.
+    fn others(&self, index: usize) -> impl Iterator<Item = &'a Person> {
+        self.people.iter().enumerate().filter(move |(i, _)| *i != index).map(|(_, other)| other)
     }
 }
 
-/// The person's mask without the pixels that one of the others claims more strongly.
-fn own_pixels<'a>(person: &Person, others: impl Iterator<Item = &'a Person>) -> Mask {
-    let own = &person.mask;
-    let width = own.width.max(1) as usize;
-    let person_claim = Claim::of(person);
-    let mut mask = own.clone();
-    let mut lost = false;
-    for other in others.filter(|other| touch(own, &other.mask)) {
-        let other_claim = Claim::of(other);
-        for (i, &coverage) in own.coverage.iter().enumerate() {
-            let (x, y) = (own.x0 + (i % width) as i32, own.y0 + (i / width) as i32);
-            let rival = other.mask.at(x, y);
-            if coverage == 0 || rival == 0 {
-                continue;
-            }
-            let pixel = DVec2::new(f64::from(x), f64::from(y));
-            if other_claim.strength(pixel, rival) > person_claim.strength(pixel, coverage) {
-                mask.coverage[i] = 0;
-                lost = true;
+/// A way to find the pixels of tracked people. Masks come with the frame they were asked for or later, in no order.
+pub trait Segmenter {
+    /// Takes the next frame; gives the masks that are now decided.
+    ///
+    /// # Errors
+    /// When a network fails.
+    fn push(&mut self, seen: &FrameSeen<'_>) -> Result<Vec<PlayerMask>, SegmentationError>;
+
+    /// No further frame comes: the masks still open.
+    ///
+    /// # Errors
+    /// When a network fails.
+    fn finish(&mut self) -> Result<Vec<PlayerMask>, SegmentationError> {
+        Ok(Vec::new())
+    }
+}
+
+/// Why masks could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum SegmentationError {
+    /// The network could not be loaded or run.
+    #[error("mask network: {0}")]
+    Inference(#[from] InferenceError),
+}
+
+/// The ways to find masks that the ablation compares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum Method {
+    /// The pose network's own instance mask.
+    Network,
+    /// The same, minus pixels nearer to somebody else's skeleton.
+    Claims,
+    /// The same, times the energy's mask (Mₒ).
+    NetworkEnergy,
+    /// The temporal CRF (M_CNN) on it.
+    Crf,
+    /// The paper's product of energy and CRF.
+    Paper,
+    /// A small network that sees the picture, the pose network's masks and everybody's skeleton.
+    Refined,
+}
+
+impl Method {
+    /// What `reconstruct` uses.
+    pub const DEFAULT: Self = Self::Refined;
+
+    /// Every method, the default first.
+    pub const ALL: [Self; 6] =
+        [Self::DEFAULT, Self::Network, Self::Claims, Self::NetworkEnergy, Self::Crf, Self::Paper];
+
+    /// Its name on the command line and in figures.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Network => "network",
+            Self::Claims => "claims",
+            Self::NetworkEnergy => "network-energy",
+            Self::Crf => "crf",
+            Self::Paper => "paper",
+            Self::Refined => "refined",
+        }
+    }
+
+    /// Makes it ready for a clip.
+    ///
+    /// # Errors
+    /// When its network is missing or unusable.
+    pub fn open(self) -> Result<Box<dyn Segmenter>, SegmentationError> {
+        let paper = |parts| Ok(Box::new(PaperSegmenter::new(parts)) as Box<dyn Segmenter>);
+        match self {
+            Self::Network => Ok(Box::new(InstanceMaskSegmenter { claims: false })),
+            Self::Claims => Ok(Box::new(InstanceMaskSegmenter { claims: true })),
+            Self::NetworkEnergy => paper(Parts { energy: true, crf: false }),
+            Self::Crf => paper(Parts { energy: false, crf: true }),
+            Self::Paper => paper(Parts { energy: true, crf: true }),
+            Self::Refined => Ok(Box::new(RefiningSegmenter::load()?)),
+        }
+    }
+}
+
+/// The pose network's instance mask.
+#[derive(Clone, Copy, Debug)]
+pub struct InstanceMaskSegmenter {
+    /// Whether pixels go that belong more to somebody else in the frame.
+    pub claims: bool,
+}
+
+impl Segmenter for InstanceMaskSegmenter {
+    fn push(&mut self, seen: &FrameSeen<'_>) -> Result<Vec<PlayerMask>, SegmentationError> {
+        let masks = seen.tracked().map(|(_, person_index, person)| {
+            let mask = if self.claims {
+                exclusive::own_pixels(person, seen.others(person_index))
+            } else {
+                person.mask.clone()
+            };
+            PlayerMask { sighting: Sighting { frame: seen.index, person_index }, mask }
+        });
+        Ok(masks.collect())
+    }
+}
+
+/// Who is followed in each of `frames` frames, by track: what [`FrameSeen::followed`] wants.
+#[must_use]
+pub fn followed(tracks: &[Track], frames: usize) -> Vec<Vec<(PersonId, usize)>> {
+    let mut all = vec![Vec::new(); frames];
+    for track in tracks {
+        for sighting in &track.sightings {
+            if let Some(frame) = all.get_mut(sighting.frame) {
+                frame.push((track.person, sighting.person_index));
             }
         }
     }
-    if lost { cut(&mask) } else { mask }
+    all
 }
 
-fn touch(a: &Mask, b: &Mask) -> bool {
-    let span = |start: i32, length: u32| (i64::from(start), i64::from(start) + i64::from(length));
-    let overlap = |p: (i64, i64), q: (i64, i64)| p.0 < q.1 && q.0 < p.1;
-    overlap(span(a.x0, a.width), span(b.x0, b.width)) && overlap(span(a.y0, a.height), span(b.y0, b.height))
-}
-
-/// What a person's skeleton says about a pixel.
-struct Claim {
-    bones: Vec<(DVec2, DVec2)>,
-    /// Half the thickness of a limb, pixels.
-    limb_px: f64,
-}
-
-impl Claim {
-    fn of(person: &Person) -> Self {
-        // A limb is about an eighth of the body's height across.
-        let limb_px = (person.bounds.size().max_element() / 16.0).max(1.0);
-        Self { bones: bones(&person.joints), limb_px }
+/// The decided masks by frame, pixels that several people hold given to one of them; masks without any pixel are left out.
+#[must_use]
+pub fn settled(masks: Vec<PlayerMask>, people: &[Vec<Person>]) -> BTreeMap<usize, Vec<PlayerMask>> {
+    let mut frames: BTreeMap<usize, Vec<PlayerMask>> = BTreeMap::new();
+    for mask in masks {
+        frames.entry(mask.sighting.frame).or_default().push(mask);
     }
-
-    /// Coverage, weighted down with the distance from the skeleton.
-    fn strength(&self, pixel: DVec2, coverage: u8) -> f64 {
-        let squared =
-            self.bones.iter().map(|&bone| squared_distance(pixel, bone)).fold(f64::INFINITY, f64::min);
-        f64::from(coverage) / (1.0 + squared / self.limb_px.powi(2))
+    for (frame, masks) in &mut frames {
+        masks.sort_by_key(|mask| mask.sighting.person_index);
+        exclusive(masks, people.get(*frame).map_or(&[], Vec::as_slice));
+        masks.retain(|found| found.mask.area_px() > 0);
     }
-}
-
-fn squared_distance(point: DVec2, (from, to): (DVec2, DVec2)) -> f64 {
-    let along = to - from;
-    let length = along.length_squared();
-    let part = if length > 0.0 { ((point - from).dot(along) / length).clamp(0.0, 1.0) } else { 0.0 };
-    point.distance_squared(from + along * part)
+    frames
 }
 
 #[cfg(test)]
-mod tests {
-    use glam::DVec3;
-    use protocol::manifest::PersonId;
-
-    use super::*;
-    use crate::{
-        geometry::PixelBox,
-        pose::{JOINTS, Joint},
-    };
-
-    /// Somebody whose skeleton is an upright line at `x`, with a mask `reach` pixels to both sides.
-    fn upright(x: i32, reach: i32) -> Person {
-        let pixel = |i: usize| DVec2::new(f64::from(x), i as f64 * 2.0);
-        let joints = (0..JOINTS).map(|i| Joint { pixel: pixel(i), depth_m: 0.0, visibility: 1.0 }).collect();
-        let width = (2 * reach + 1) as u32;
-        let mask = Mask { x0: x - reach, y0: 0, width, height: 60, coverage: vec![255; width as usize * 60] };
-        let side = f64::from(reach);
-        let bounds = PixelBox {
-            min: DVec2::new(f64::from(x) - side, 0.0),
-            max: DVec2::new(f64::from(x) + side, 64.0),
-        };
-        Person {
-            bounds,
-            score: 0.5,
-            pose_score: 0.9,
-            joints,
-            mask,
-            neck_px: pixel(10),
-            ground_m: DVec3::ZERO,
-            neck_m: DVec3::ZERO,
-        }
-    }
-
-    fn track(person: u32, person_index: usize) -> Track {
-        Track { person: PersonId(person), sightings: vec![Sighting { frame: 0, person_index }] }
-    }
-
-    #[test]
-    fn a_pixel_two_people_claim_goes_to_the_nearer_skeleton() {
-        let people = vec![vec![upright(100, 8), upright(110, 8)]];
-        let tracks = [track(1, 0), track(2, 1)];
-        let masks = segment(&people, &tracks, &mut InstanceMaskSegmenter);
-        assert_eq!(masks.len(), 2);
-        let (left, right) = (&masks[0].mask, &masks[1].mask);
-        for x in 92..=118 {
-            assert!(left.at(x, 30) == 0 || right.at(x, 30) == 0 || x == 105, "both have column {x}");
-        }
-        assert_eq!((left.at(103, 30), right.at(103, 30)), (255, 0));
-        assert_eq!((left.at(107, 30), right.at(107, 30)), (0, 255));
-        assert_eq!((left.at(92, 30), right.at(118, 30)), (255, 255));
-    }
-
-    #[test]
-    fn somebody_alone_keeps_the_mask_and_lost_sightings_are_left_out() {
-        let people = vec![vec![upright(100, 8)]];
-        let gone = Track { person: PersonId(2), sightings: vec![Sighting { frame: 7, person_index: 3 }] };
-        let masks = segment(&people, &[track(1, 0), gone], &mut InstanceMaskSegmenter);
-        assert_eq!(masks.len(), 1);
-        assert_eq!(masks[0].mask, people[0][0].mask);
-    }
-}
+pub(crate) mod tests;

@@ -1,9 +1,10 @@
 //! Section 4.5: smooth paths on the pitch.
 //!
 //! Per person the paper's energy, Σ ‖X_t − D_t‖² over the frames with a sighting plus w·Σ ‖X_{t−1} − 2X_t + X_{t+1}‖² over
-//! all frames, is the linear system it is. Bodies move by what smoothing moved their anchor.
+//! all frames, is the linear system it is. Bodies move by what smoothing moved their anchor. Poses are smoothed along the
+//! tracks too ([`smooth_poses`]), before anything is made of them.
 
-mod banded;
+mod poses;
 
 use std::collections::BTreeMap;
 
@@ -11,8 +12,8 @@ use glam::{DVec2, DVec3};
 use protocol::manifest::PersonId;
 use thiserror::Error;
 
-use crate::mesh::BodySurface;
-use banded::Pentadiagonal;
+use crate::{banded::Banded, mesh::BodySurface};
+pub use poses::{PoseChanges, smooth_poses};
 
 /// How strongly paths are smoothed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,10 +67,10 @@ pub fn smooth(measured: &[Option<DVec2>], weight: f64) -> Result<Vec<DVec2>, Tra
     }
     // With no weight, gaps would be free: a little is enough to make them straight.
     let weight = if sightings < frames { weight.max(1e-6) } else { weight.max(0.0) };
-    let mut system =
-        Pentadiagonal::diagonal(data.iter().map(|m| if m.is_some() { 1.0 } else { 0.0 }).collect());
+    let seen: Vec<f64> = data.iter().map(|m| if m.is_some() { 1.0 } else { 0.0 }).collect();
+    let mut system = Banded::diagonal(&seen, 2);
     for first in 0..frames.saturating_sub(2) {
-        system.add_outer(first, [1.0, -2.0, 1.0], weight);
+        system.add_outer(&[(first, 1.0), (first + 1, -2.0), (first + 2, 1.0)], weight);
     }
     let factor = system.cholesky().ok_or(underdetermined)?;
     let solve = |axis: fn(DVec2) -> f64| {
@@ -81,11 +82,11 @@ pub fn smooth(measured: &[Option<DVec2>], weight: f64) -> Result<Vec<DVec2>, Tra
     Ok(x.into_iter().zip(z).map(|(x, z)| DVec2::new(x, z)).collect())
 }
 
-/// The smooth path of one person on the pitch.
-#[derive(Clone, Debug, PartialEq)]
+/// The smooth path of one person on the pitch, in parts between which nothing is known.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Path {
-    first_frame: usize,
-    positions_m: Vec<DVec2>,
+    /// First frame and the places from there on, in order of time.
+    parts: Vec<(usize, Vec<DVec2>)>,
 }
 
 impl Path {
@@ -100,13 +101,34 @@ impl Path {
         let measured: Vec<Option<DVec2>> = (*first_frame..=*last_frame)
             .map(|frame| sightings.get(&frame).map(|anchor| DVec2::new(anchor.x, anchor.z)))
             .collect();
-        Ok(Self { first_frame: *first_frame, positions_m: smooth(&measured, weight)? })
+        Ok(Self { parts: vec![(*first_frame, smooth(&measured, weight)?)] })
+    }
+
+    /// The path through parts that are smoothed each on its own, in order of time, such as the shots of a clip.
+    ///
+    /// # Errors
+    /// As [`smooth`], when that fails for all parts; a part that fails alone is left out.
+    pub fn through_parts<'a>(
+        parts: impl Iterator<Item = &'a BTreeMap<usize, DVec3>>,
+        weight: f64,
+    ) -> Result<Self, TrajectoryError> {
+        let mut path = Self::default();
+        let mut failed = TrajectoryError::Underdetermined { sightings: 0, frames: 0 };
+        for part in parts {
+            match Self::through(part, weight) {
+                Ok(mut more) => path.parts.append(&mut more.parts),
+                Err(error) => failed = error,
+            }
+        }
+        if path.parts.is_empty() { Err(failed) } else { Ok(path) }
     }
 
     /// Where the person stands at a frame, world metres on the pitch; `None` outside the path.
     #[must_use]
     pub fn at(&self, frame: usize) -> Option<DVec3> {
-        let position = self.positions_m.get(frame.checked_sub(self.first_frame)?)?;
+        let part = self.parts.partition_point(|(first, _)| *first <= frame).checked_sub(1)?;
+        let (first, positions_m) = self.parts.get(part)?;
+        let position = positions_m.get(frame - first)?;
         Some(DVec3::new(position.x, 0.0, position.y))
     }
 }
@@ -228,5 +250,15 @@ mod tests {
         assert_eq!(path.at(3), None);
         assert!(path.at(6).unwrap().distance(DVec3::new(2.0, 0.0, 1.0)) < 1e-6);
         assert_eq!(path.at(9), None);
+    }
+
+    #[test]
+    fn parts_do_not_pull_at_each_other() {
+        let part = |frame: usize, x: f64| (frame..frame + 5).map(|f| (f, DVec3::new(x, 0.0, 1.0))).collect();
+        let parts: [BTreeMap<usize, DVec3>; 2] = [part(2, 0.0), part(7, 3.0)];
+        let path = Path::through_parts(parts.iter(), 200.0).unwrap();
+        assert!(path.at(6).unwrap().x.abs() < 1e-9 && (path.at(7).unwrap().x - 3.0).abs() < 1e-9);
+        assert_eq!((path.at(1), path.at(12)), (None, None));
+        assert!(Path::through_parts([].iter(), 1.0).is_err());
     }
 }

@@ -146,7 +146,7 @@ pub fn stream_frame(
         duration: Ticks(1),
         camera: Some(truth.camera),
         quality: FrameQuality { line_residual_px: Some(0.0), track_confidence: Some(1.0) },
-        ball: Some(Ball { position_m: DVec3::from(truth.ball.position_m), height_known: true }),
+        ball: Some(Ball { position_m: DVec3::from(truth.ball.position_m), height_known: true, spread: None }),
         atlas: Some(palette.clone()),
         bodies,
     }
@@ -213,8 +213,11 @@ impl StreamWriter {
             .map(|person| Person {
                 id: PersonId(person.id),
                 team: person.team.map(str::to_owned),
+                team_confidence: None,
+                role_confidence: None,
                 role: serde_json::to_value(person.role).ok().and_then(|v| v.as_str().map(str::to_owned)),
                 number: person.number,
+                number_confidence: None,
                 shirt_rgb: Some(person.shirt_rgb),
             })
             .collect();

@@ -1,4 +1,5 @@
-//! How the detector and the pose network, which never saw a rendered picture, do on labelled ones.
+//! How the detector, which real and then rendered pictures trained, and the pose network, which never saw a rendered one, do on labelled
+//! pictures.
 
 use super::{LabelledPicture, NetworkFigures, RealismError, spread};
 use crate::{
@@ -33,8 +34,7 @@ pub(super) fn look(pictures: &[LabelledPicture], progress: &Progress) -> Result<
     for labelled in pictures {
         let LabelledPicture { picture, people: labels, .. } = labelled;
         people += labels.len();
-        let mut detections = detector.detect(picture)?;
-        detections.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let detections = detector.detect(picture)?.people;
         let claims = labelled.claims(detections.iter().map(|detection| &detection.bounds));
         found += claims.iter().filter(|is_person| **is_person).count();
         let step = labels.len().div_ceil(POSES_PER_PICTURE).max(1);

@@ -18,6 +18,9 @@ use crate::{detection::DetectionError, pose::PoseError, report::Progress};
 
 pub use sheet::{SheetError, sheet};
 
+/// Every picture is brought to this size: sets of real pictures are often stretched to squares.
+const SIZE_PX: (u32, u32) = (1280, 720);
+
 /// Figures of one measure over all pictures, or over all people of all pictures.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Spread {
@@ -95,7 +98,7 @@ pub enum RealismError {
 /// # Errors
 /// When a folder holds no labelled pictures or a network cannot run.
 pub fn evaluate(real: &Path, ours: &Path, progress: &Progress) -> Result<RealismFigures, RealismError> {
-    let [real, ours] = [labelled::read(real)?, labelled::read(ours)?];
+    let [real, ours] = [labelled::read(real, Some(SIZE_PX))?, labelled::read(ours, Some(SIZE_PX))?];
     // Each measure with its values over all pictures.
     let measure = |pictures: &[LabelledPicture]| -> Vec<(&'static str, Vec<f64>)> {
         let measured: Vec<_> = pictures

@@ -1,0 +1,105 @@
+//! Offline tracking of one shot: tracklets without doubt, linked over gaps all at once, and then cleaned of what is nobody.
+
+use glam::DVec2;
+
+use super::{
+    Sighting,
+    links::{Node, Round, join, links},
+    motion::Place,
+    tracklets::{Seen, Tracklet, tracklets},
+};
+use crate::pose::Person;
+
+/// Rounds of linking within a shot, from short and clear to long and likeliest.
+const ROUNDS: [(f64, f64); 5] = [(0.13, 4.0), (0.4, 3.0), (1.0, 2.0), (2.5, 1.0), (2.5, f64::NEG_INFINITY)];
+/// A round is repeated while it links anything, at most so many times.
+const REPEATS: usize = 6;
+/// People on a pitch, per square metre.
+const OTHERS_PER_M2: f64 = 0.005;
+/// Loss of a second without a sighting.
+const UNSEEN_PER_S: f64 = 0.8;
+/// Two tracks are one person seen twice when for most of the shorter's time they are this near on the pitch and their boxes overlap this much.
+const TWICE_M: f64 = 0.8;
+const TWICE_OVERLAP: f64 = 0.5;
+const TWICE_SHARE: f64 = 0.6;
+
+/// Who is who within one shot; every list by frame.
+pub(super) fn chains(
+    people: &[Vec<Person>],
+    seconds: &[f64],
+    cameras: &[Option<DVec2>],
+    gap_s: f64,
+) -> Vec<Vec<Sighting>> {
+    let frames: Vec<Vec<Seen>> = people
+        .iter()
+        .enumerate()
+        .map(|(frame, people)| {
+            let from = cameras.get(frame).copied().flatten();
+            let seconds = seconds.get(frame).copied().unwrap_or(f64::NAN);
+            let seen = people.iter().enumerate().map(|(person_index, person)| Seen {
+                sighting: Sighting { frame, person_index },
+                seconds,
+                place: Place::seen(DVec2::new(person.neck_m.x, person.neck_m.z), from),
+                looks: person.looks,
+            });
+            seen.filter(|seen| seen.place.at.is_finite() && seen.seconds.is_finite()).collect()
+        })
+        .collect();
+    let mut runs = tracklets(&frames);
+    for (round_gap_s, clear_by) in ROUNDS {
+        let round = Round {
+            gap_s: round_gap_s.min(gap_s),
+            clear_by,
+            others_per_m2: OTHERS_PER_M2,
+            apart_m: 0.0,
+            unseen_per_s: UNSEEN_PER_S,
+        };
+        for _ in 0..REPEATS {
+            let nodes: Vec<Node> = runs.iter().filter_map(Node::of).collect();
+            let found = links(&nodes, &round, &|_, _| Some(0.0));
+            if found.is_empty() {
+                break;
+            }
+            join(&mut runs, &found, |run| run.first().map_or(0.0, |seen| seen.seconds));
+            runs.retain(|run| !run.is_empty());
+        }
+    }
+    let runs = without_doubles(runs, people);
+    runs.into_iter().map(|run| run.into_iter().map(|seen| seen.sighting).collect()).collect()
+}
+
+/// Leaves out tracks that are a second sighting of somebody for most of their time.
+fn without_doubles(mut runs: Vec<Tracklet>, people: &[Vec<Person>]) -> Vec<Tracklet> {
+    runs.sort_by_key(|run| std::cmp::Reverse(run.len()));
+    let frames = people.len();
+    let mut kept: Vec<Tracklet> = Vec::new();
+    // Place in `kept` of everybody in a frame.
+    let mut by_frame: Vec<Vec<(usize, Sighting)>> = vec![Vec::new(); frames];
+    for run in runs {
+        let mut twice = vec![0_usize; kept.len()];
+        for seen in &run {
+            for (place, other) in by_frame.get(seen.sighting.frame).into_iter().flatten() {
+                if let Some(count) = twice.get_mut(*place) {
+                    *count += usize::from(coincide(people, seen.sighting, *other));
+                }
+            }
+        }
+        let most = twice.into_iter().max().unwrap_or(0);
+        if most as f64 >= TWICE_SHARE * run.len() as f64 {
+            continue;
+        }
+        for seen in &run {
+            if let Some(frame) = by_frame.get_mut(seen.sighting.frame) {
+                frame.push((kept.len(), seen.sighting));
+            }
+        }
+        kept.push(run);
+    }
+    kept
+}
+
+fn coincide(people: &[Vec<Person>], a: Sighting, b: Sighting) -> bool {
+    let person = |s: Sighting| people.get(s.frame)?.get(s.person_index);
+    let (Some(a), Some(b)) = (person(a), person(b)) else { return false };
+    a.ground_m.distance(b.ground_m) < TWICE_M && a.bounds.iou(&b.bounds) > TWICE_OVERLAP
+}

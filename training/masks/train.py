@@ -1,0 +1,148 @@
+"""Trains the mask network on what `prepare.py` wrote, logs the curve, keeps the running average of the weights.
+
+    python3 train.py --data PREPARED --validation PREPARED-VALIDATION --out RUN --minutes 4
+"""
+
+import argparse
+import csv
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
+
+from common import average_in, rate_at
+from network import MaskNetwork
+
+BATCH = 16
+WEIGHT_DECAY = 0.01
+AVERAGE = 0.998
+
+
+def read(folder):
+    parts = [np.load(path) for path in sorted(Path(folder).glob("*.npz"))]
+    return [np.concatenate([part[name] for part in parts]) for name in ("x", "y")]
+
+
+def varied(windows, masks, rng):
+    """Mirrored, and with other light and colours: what a kit looks like must not matter."""
+    x, y = windows.astype(np.float32) / 255.0, masks.astype(np.float32) / 255.0
+    for k in range(len(x)):
+        if rng.random() < 0.5:
+            x[k], y[k] = x[k, :, :, ::-1].copy(), y[k, :, ::-1].copy()
+        colours = x[k, :3]
+        if rng.random() < 0.3:
+            colours = colours[rng.permutation(3)]
+        gain, lift = np.exp(rng.normal(0, 0.15, (3, 1, 1))), rng.normal(0, 0.05)
+        x[k, :3] = np.clip(colours * gain + lift + rng.normal(0, 0.01, colours.shape), 0, 1)
+        if rng.random() < 0.1:
+            # A mask network that fails in a part of the body.
+            row = rng.integers(0, 96)
+            x[k, 3, row : row + rng.integers(4, 24)] = 0
+    return torch.from_numpy(x).contiguous(memory_format=torch.channels_last), torch.from_numpy(y)
+
+
+def loss_of(logits, masks):
+    """Cross entropy, and one minus the soft intersection over union of every window."""
+    chance = torch.sigmoid(logits)
+    both = (chance * masks).sum((1, 2))
+    either = (chance + masks - chance * masks).sum((1, 2))
+    return functional.binary_cross_entropy_with_logits(logits, masks) * 3.0 + (1 - (both + 1) / (either + 1)).mean()
+
+
+def overlap(chance, masks):
+    ours, true = chance >= 0.5, masks >= 0.5
+    return ((ours & true).sum((1, 2)).float() / (ours | true).sum((1, 2)).clamp(min=1)).numpy()
+
+
+@torch.no_grad()
+def validate(network, windows, masks):
+    network.eval()
+    found, before = [], []
+    for start in range(0, len(windows), 32):
+        x = torch.from_numpy(windows[start : start + 32]).float() / 255.0
+        y = torch.from_numpy(masks[start : start + 32]).float() / 255.0
+        found.append(overlap(torch.sigmoid(network(x)), y))
+        before.append(overlap(x[:, 3], y))
+    network.train()
+    return np.concatenate(found).mean(), np.concatenate(before).mean()
+
+
+@torch.no_grad()
+def settle(network, windows, masks, rng, count=30):
+    """Measures the batch statistics of averaged weights anew."""
+    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
+    for norm in norms:
+        norm.reset_running_stats()
+        norm.momentum = None
+    network.train()
+    for _ in range(count):
+        chosen = rng.choice(len(windows), BATCH)
+        network(varied(windows[chosen], masks[chosen], rng)[0])
+    for norm in norms:
+        norm.momentum = 0.1
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--validation", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--minutes", type=float, default=4.0, help="of processor time")
+    parser.add_argument("--rate", type=float, default=4e-3)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", help="checkpoint to go on from")
+    arguments = parser.parse_args()
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)
+    torch.manual_seed(arguments.seed)
+    rng = np.random.default_rng(arguments.seed)
+    out = Path(arguments.out)
+    out.mkdir(parents=True, exist_ok=True)
+    (windows, masks), held = read(arguments.data), read(arguments.validation)
+    print(f"{len(windows)} windows to train on, {len(held[0])} to watch the curve", flush=True)
+    network, average = [MaskNetwork().to(memory_format=torch.channels_last) for _ in range(2)]
+    if arguments.start:
+        network.load_state_dict(torch.load(arguments.start))
+    average.load_state_dict(network.state_dict())
+    optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
+    curve = csv.writer((out / "curve.csv").open("w", newline=""))
+    curve.writerow(["seconds", "windows", "loss", "validation_iou", "pose_network_iou"])
+    began, budget = time.process_time(), arguments.minutes * 60.0
+    steps, running, reported = 0, None, 0.0
+    order = []
+    while True:
+        elapsed = time.process_time() - began
+        part = elapsed / max(budget, 1e-9)
+        if part >= 1.0 or elapsed - reported >= min(60.0, budget / 3):
+            reported = elapsed
+            settle(average, windows, masks, rng)
+            iou, before = validate(average, *held)
+            curve.writerow([f"{elapsed:.0f}", steps * BATCH, f"{running or 0:.4f}", f"{iou:.4f}", f"{before:.4f}"])
+            print(f"{elapsed:.0f} s, {steps * BATCH} windows, loss {running or 0:.3f}, iou {iou:.4f} (pose network {before:.4f})", flush=True)
+            torch.save(average.state_dict(), out / "average.pt")
+            torch.save(network.state_dict(), out / "network.pt")
+        if part >= 1.0:
+            break
+        for group in optimizer.param_groups:
+            group["lr"] = rate_at(arguments.rate, part, steps, warm_up=60)
+        if len(order) < BATCH:
+            order = list(rng.permutation(len(windows)))
+        chosen = [order.pop() for _ in range(BATCH)]
+        x, y = varied(windows[chosen], masks[chosen], rng)
+        loss = loss_of(network(x), y)
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
+        optimizer.step()
+        steps += 1
+        average_in(average, network, steps, AVERAGE)
+        running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()
+
+
+if __name__ == "__main__":
+    main()
