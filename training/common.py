@@ -1,12 +1,83 @@
-"""What both trainings share: the course of the learning rate, and the running average of the weights."""
+"""What the trainings share: arguments, start, supply of batches, the course of the learning rate, the running average of the weights."""
 
+import argparse
+import csv
 import math
+import queue
+import threading
+from pathlib import Path
 
+import numpy as np
 import torch
 
 
+def parser_of(text, minutes, rate):
+    """A parser of the arguments that every training has; each adds its own."""
+    parser = argparse.ArgumentParser(description=text)
+    parser.add_argument("--data", required=True)
+    parser.add_argument("--validation", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--minutes", type=float, default=minutes)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rate", type=float, default=rate, help="highest learning rate")
+    parser.add_argument("--start", help="checkpoint to go on from")
+    return parser
+
+
+def begin(arguments):
+    """One thread for the network, a seed for what is drawn; gives the generator of numbers and the folder of the run."""
+    torch.set_num_threads(1)
+    torch.set_flush_denormal(True)
+    torch.manual_seed(arguments.seed)
+    out = Path(arguments.out)
+    out.mkdir(parents=True, exist_ok=True)
+    return np.random.default_rng(arguments.seed), out
+
+
+def with_average(network, checkpoint):
+    """The network, with the weights of the checkpoint if there is one, and another that will hold their running average."""
+    if checkpoint:
+        network.load_state_dict(torch.load(checkpoint))
+    average = type(network)()
+    average.load_state_dict(network.state_dict())
+    return network.to(memory_format=torch.channels_last), average.to(memory_format=torch.channels_last)
+
+
+def curve_of(out, columns):
+    """The open table of the run's progress; every line is on disk at once."""
+    curve = csv.writer((out / "curve.csv").open("w", newline="", buffering=1))
+    curve.writerow(["seconds", "samples", *columns])
+    return curve
+
+
+def batches(data, size, draw, make):
+    """Endless batches, made by a thread beside the training: `draw` gives the indices of a round, `make` a batch of `size` of them.
+
+    Before each round `data` takes in what was rendered since, so `draw` must look anew how much there is.
+    """
+    ready = queue.Queue(4)
+
+    def work():
+        order = []
+        try:
+            while True:
+                if len(order) < size:
+                    data.refresh()
+                    order = list(draw())
+                ready.put(make([order.pop() for _ in range(size)]))
+        except Exception as error:  # else the training would wait for ever
+            ready.put(error)
+
+    threading.Thread(target=work, daemon=True).start()
+    while True:
+        batch = ready.get()
+        if isinstance(batch, Exception):
+            raise batch
+        yield batch
+
+
 def rate_at(highest, part, step, warm_up):
-    """Learning rate after `step` steps and a share `part` of the time: rises over `warm_up` steps, then falls as a cosine to a hundredth."""
+    """Learning rate after `step` steps and a share `part` of the time: rises over `warm_up` steps, falls as a cosine to a hundredth."""
     return highest * min(1.0, (step + 1) / warm_up) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
 
 

@@ -3,8 +3,6 @@
     python3 train.py --data PACKED/train --validation PACKED/validation --out RUN --minutes 40
 """
 
-import argparse
-import csv
 import json
 import math
 import time
@@ -14,7 +12,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from common import average_in, rate_at
+from common import average_in, begin, curve_of, parser_of, rate_at, with_average
 from network import BIN_M, BINS, DepthNetwork, bin_centres, read_out
 from window import GRID, PICTURE_SIZE
 
@@ -127,32 +125,15 @@ def validate(network, data, limit):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", required=True)
-    parser.add_argument("--validation", required=True)
-    parser.add_argument("--out", required=True)
-    parser.add_argument("--minutes", type=float, default=40.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--rate", type=float, default=2.5e-3, help="highest learning rate")
+    parser = parser_of(__doc__, minutes=40.0, rate=2.5e-3)
     parser.add_argument("--validated", type=int, default=384, help="validation samples looked at for the curve")
-    parser.add_argument("--start", help="checkpoint to go on from")
     arguments = parser.parse_args()
 
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
-    torch.manual_seed(arguments.seed)
-    rng = np.random.default_rng(arguments.seed)
-    out = Path(arguments.out)
-    out.mkdir(parents=True, exist_ok=True)
+    rng, out = begin(arguments)
     data, validation = Packed(arguments.data), Packed(arguments.validation)
-    network = DepthNetwork().to(memory_format=torch.channels_last)
-    if arguments.start:
-        network.load_state_dict(torch.load(arguments.start))
-    average = DepthNetwork().to(memory_format=torch.channels_last)
-    average.load_state_dict(network.state_dict())
+    network, average = with_average(DepthNetwork(), arguments.start)
     optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
-    curve = csv.writer((out / "curve.csv").open("w", newline=""))
-    curve.writerow(["seconds", "samples", "loss", "validation_rmse_m", "flat_plane_rmse_m", "validation_mask_iou"])
+    curve = curve_of(out, ["loss", "validation_rmse_m", "flat_plane_rmse_m", "validation_mask_iou"])
 
     began, budget = time.time(), arguments.minutes * 60.0
     seen, steps, running, reported = 0, 0, None, 0.0

@@ -62,6 +62,9 @@ pub(crate) struct Reconstruct {
     /// Write figures per frame and stage, and everything that was left out.
     #[arg(long, value_name = "FILE.json")]
     pub(crate) report: Option<PathBuf>,
+    /// Folder for pictures with masks, ids, lines and the ball drawn in, or an .mp4 file for a video of them (needs ffmpeg).
+    #[arg(long, value_name = "DIR|FILE.mp4")]
+    pub(crate) overlay: Option<PathBuf>,
     /// How people are followed: `global` is the usual one, `greedy` the paper's, as a baseline.
     #[arg(long, value_name = "global|greedy", default_value = "global", value_parser = tracking)]
     pub(crate) tracking: TrackingMethod,

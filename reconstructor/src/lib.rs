@@ -18,6 +18,7 @@ pub mod inference;
 pub mod ingest;
 pub mod jumps;
 pub mod mesh;
+pub mod overlay;
 pub mod pipeline;
 pub mod pose;
 pub mod report;

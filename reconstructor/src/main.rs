@@ -121,6 +121,7 @@ fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
         out: arguments.out,
         budget: MeshBudget { triangles: arguments.triangles as usize },
         smoothing: Smoothing::default(),
+        overlay: arguments.overlay,
     };
     let mut reporter = Reporter::new();
     let report = reconstruct(&options, &mut reporter).inspect_err(|_| {

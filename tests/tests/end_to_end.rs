@@ -51,6 +51,7 @@ fn run(out: &Path, work: &Path) -> ReconstructReport {
         out: out.to_owned(),
         budget: MeshBudget::default(),
         smoothing: Smoothing::default(),
+        overlay: Some(out.with_extension("overlay")),
     };
     reconstruct(&options, &mut Reporter::quiet()).unwrap()
 }
@@ -75,6 +76,8 @@ fn the_demo_clip_agrees_with_its_truth() {
         frames(&demo("truth")).into_iter().filter(|frame| FRAMES.contains(&frame.clip_frame)).collect();
     let figures = matches::compare(&truth, &frames(&stream));
     println!("{}", serde_json::to_string_pretty(&figures).unwrap());
+    let overlays = std::fs::read_dir(stream.with_extension("overlay")).unwrap();
+    assert_eq!(overlays.count(), FRAMES.len(), "a picture with what was seen for every frame");
     assert!(figures.coverage >= 0.85, "coverage {}", figures.coverage);
     assert!(figures.false_share <= 0.10, "false share {}", figures.false_share);
     assert!(figures.position_error_median_m.unwrap() <= 0.5, "{:?}", figures.position_error_median_m);

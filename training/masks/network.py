@@ -6,7 +6,7 @@ It works on cells of twice the side and gives four logits for each, which costs 
 from torch import nn
 
 CHANNELS = 9  # as in view.py, which needs OpenCV
-WIDTHS = (24, 40, 64)
+WIDTHS = (32, 48, 80)
 
 
 def block(inside, outside, stride=1, side=3):

@@ -10,6 +10,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
 from network import BALL_STRIDE, ROLES, STRIDE
+from spoil import add_noise, recolour, refocus, shade
 
 WIDTH, HEIGHT = 480, 320  # of a window
 ROLE = {"player": 0, "goalkeeper": 1, "referee": 2, "assistant": 2}
@@ -185,25 +186,11 @@ def ball_targets(ball, size):
 
 
 def degrade(view, rng):
-    """Exposure, contrast, white balance, saturation, shade, sharpness, noise, blocks and graphics that no two broadcasts share."""
-    if rng.random() < 0.4:
-        sigma = rng.uniform(0.3, 1.2)
-        blurred = cv2.GaussianBlur(view, (0, 0), sigma)
-        view = blurred if rng.random() < 0.5 else view + (view - blurred) * rng.uniform(0.3, 1.5)
-    gain = rng.uniform(0.65, 1.35) * rng.uniform(0.88, 1.12, 3)
-    grey = view.mean(2, keepdims=True)
-    view = (grey + (view - grey) * rng.uniform(0.5, 1.4)) * gain.astype(np.float32) + rng.uniform(-25.0, 25.0)
-    if rng.random() < 0.5:
-        view = np.clip(view, 0, 255) ** rng.uniform(0.8, 1.25)
-        view *= 255.0 / max(view.max(), 1.0) * rng.uniform(0.8, 1.0)
-    if rng.random() < 0.3:  # a shadow of the stand over part of the pitch
-        x, y = np.meshgrid(np.linspace(-1, 1, view.shape[1]), np.linspace(-1, 1, view.shape[0]))
-        angle = rng.uniform(0, 2 * np.pi)
-        side = x * np.cos(angle) + y * np.sin(angle) > rng.uniform(-0.6, 0.6)
-        view = view * np.where(side, rng.uniform(0.45, 0.8), 1.0)[..., None]
-    if rng.random() < 0.5:
-        view = view + rng.standard_normal(view.shape, np.float32) * rng.uniform(1.0, 8.0)
-    view = np.clip(view, 0, 255).astype(np.float32)
+    """What no two broadcasts share (`spoil.py`), and blocks of a JPEG."""
+    view = refocus(view, rng, share=0.4, widest=1.2)
+    view = recolour(view, rng)
+    view = shade(view, rng)
+    view = np.clip(add_noise(view, rng, strongest=8.0), 0, 255).astype(np.float32)
     if rng.random() < 0.4:
         quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(35, 90))]
         view = cv2.imdecode(cv2.imencode(".jpg", view.astype(np.uint8), quality)[1], cv2.IMREAD_COLOR).astype(np.float32)

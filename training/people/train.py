@@ -3,12 +3,8 @@
     python3 train.py --data ../../target/datasets/people/train --validation ../../target/datasets/people/validation --out RUN --minutes 100
 """
 
-import argparse
-import csv
 import json
-import queue
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -19,7 +15,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, rate_at
+from common import average_in, batches, begin, curve_of, parser_of, rate_at, with_average
 from dataset import Frames, sample, targets, whole
 from network import BALL_STRIDE, BINS, ROLES, STRIDE, PeopleNetwork, distances, start_from_nanodet
 
@@ -29,23 +25,6 @@ AVERAGE = 0.998
 ROLE_WEIGHTS = (1.0, 3.0, 2.0, 2.0)
 SCORE_MIN, BALL_SCORE_MIN = 0.4, 0.3  # from which something counts as found in validation
 SAME_IOU = 0.55
-
-
-def batches(data, rng):
-    """Endless shuffled batches of samples, made by a thread beside the training."""
-    ready = queue.Queue(4)
-
-    def make():
-        order = []
-        while True:
-            if len(order) < BATCH:
-                data.refresh()
-                order = list(rng.permutation(len(data)))
-            ready.put([sample(data.frames[order.pop()], rng) for _ in range(BATCH)])
-
-    threading.Thread(target=make, daemon=True).start()
-    while True:
-        yield ready.get()
 
 
 def stack(samples):
@@ -175,49 +154,32 @@ def validate(network, samples):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", required=True)
-    parser.add_argument("--validation", required=True)
-    parser.add_argument("--out", required=True)
-    parser.add_argument("--nanodet", help="NanoDet-g as ONNX, to start from (see README.md)")
-    parser.add_argument("--minutes", type=float, default=100.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--rate", type=float, default=8e-4, help="highest learning rate of the heads")
-    parser.add_argument("--backbone", type=float, default=0.25, help="share of it for NanoDet's layers")
+    parser = parser_of(__doc__, minutes=100.0, rate=8e-4)
+    parser.add_argument("--nanodet", help="NanoDet-g as ONNX, to start from without a checkpoint (see README.md)")
+    parser.add_argument("--backbone", type=float, default=0.25, help="share of the learning rate for NanoDet's layers")
     parser.add_argument("--pictures", type=int, default=48, help="pictures to watch the curve on")
-    parser.add_argument("--start", help="checkpoint to go on from, instead of NanoDet's weights")
     arguments = parser.parse_args()
 
-    torch.set_num_threads(1)
     cv2.setNumThreads(0)
-    torch.set_flush_denormal(True)
-    torch.manual_seed(arguments.seed)
-    rng = np.random.default_rng(arguments.seed)
-    out = Path(arguments.out)
-    out.mkdir(parents=True, exist_ok=True)
+    rng, out = begin(arguments)
     data, watched = Frames(arguments.data), Frames(arguments.validation)
     watched = [whole(frame) for frame in watched.frames[:: max(len(watched) // arguments.pictures, 1)]]
     print(f"{len(data)} pictures to train on, {len(watched)} to watch the curve", flush=True)
     network = PeopleNetwork()
-    if arguments.start:
-        network.load_state_dict(torch.load(arguments.start))
-    else:
+    if not arguments.start:
         start_from_nanodet(network, arguments.nanodet)
-    network = network.to(memory_format=torch.channels_last)
-    average = PeopleNetwork().to(memory_format=torch.channels_last)
-    average.load_state_dict(network.state_dict())
+    network, average = with_average(network, arguments.start)
     backbone = {id(p) for p in network.backbone()}
     groups = [
         {"params": [p for p in network.parameters() if id(p) not in backbone], "share": 1.0},
         {"params": network.backbone(), "share": arguments.backbone},
     ]
     optimizer = torch.optim.AdamW(groups, arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
-    curve = csv.writer((out / "curve.csv").open("w", newline=""))
-    curve.writerow(["seconds", "samples", "people_loss", "ball_loss", "recall", "precision", "roles", "ball_recall", "ball_precision"])
+    curve = curve_of(out, ["people_loss", "ball_loss", "recall", "precision", "roles", "ball_recall", "ball_precision"])
 
     began, budget = time.time(), arguments.minutes * 60.0
     seen, steps, running, reported = 0, 0, None, 0.0
-    supply = batches(data, rng)
+    supply = batches(data, BATCH, lambda: rng.permutation(len(data)), lambda indices: [sample(data.frames[k], rng) for k in indices])
     while True:
         elapsed = time.time() - began
         part = elapsed / max(budget, 1e-9)

@@ -1,12 +1,16 @@
 """Rendered broadcast pictures (`cargo xtask dataset frames-train`) as samples of the pitch network: picture and target maps."""
 
 import json
+import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from points import CHANNELS, LINES, POINTS, area, lines, mirrored, points
+sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
+
+from points import CHANNELS, POINTS, area, lines, mirrored, points
+from spoil import add_noise, recolour, refocus, shade
 
 WIDTH, HEIGHT = 512, 288
 STRIDE = 4
@@ -121,6 +125,11 @@ class Frames:
             return 3.0
         return 4.0 if ends >= 4 and centre <= 2 else 1.5 if ends >= 4 else 0.6
 
+    def drawn(self, rng):
+        """As many indices as there are pictures, drawn by their weights."""
+        weights = np.array([self.weight(index) for index in range(len(self))])
+        return rng.choice(len(self), len(self), p=weights / weights.sum())
+
     def _end(self, index):
         """Where the penalty area in view is (the near one from behind a goal), pixels; none when none is."""
         camera, pitch = self.cameras[index], self.pitches[index]
@@ -174,24 +183,11 @@ def _drawn_affine(rng, width, height, flip, towards=None):
 
 
 def degrade(view, rng):
-    """Exposure, contrast, white balance, saturation, hue, shade, sharpness, noise, blocks and graphics that no two broadcasts share."""
-    if rng.random() < 0.35:
-        sigma = rng.uniform(0.3, 1.3)
-        blurred = cv2.GaussianBlur(view, (0, 0), sigma)
-        view = blurred if rng.random() < 0.5 else view + (view - blurred) * rng.uniform(0.3, 1.5)
-    gain = rng.uniform(0.65, 1.35) * rng.uniform(0.88, 1.12, 3)
-    grey = view.mean(2, keepdims=True)
-    view = (grey + (view - grey) * rng.uniform(0.5, 1.4)) * gain.astype(np.float32) + rng.uniform(-25.0, 25.0)
-    if rng.random() < 0.5:
-        view = np.clip(view, 0, 255) ** rng.uniform(0.8, 1.25)
-        view *= 255.0 / max(view.max(), 1.0) * rng.uniform(0.8, 1.0)
-    if rng.random() < 0.3:  # a shadow of the stand over part of the pitch
-        x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(-1, 1, HEIGHT))
-        angle = rng.uniform(0, 2 * np.pi)
-        side = x * np.cos(angle) + y * np.sin(angle) > rng.uniform(-0.6, 0.6)
-        view = view * np.where(side, rng.uniform(0.45, 0.8), 1.0)[..., None]
-    if rng.random() < 0.5:
-        view = view + rng.standard_normal(view.shape, np.float32) * rng.uniform(1.0, 9.0)
+    """What no two broadcasts share (`spoil.py`), and graphics."""
+    view = refocus(view, rng, share=0.35, widest=1.3)
+    view = recolour(view, rng)
+    view = shade(view, rng)
+    view = add_noise(view, rng, strongest=9.0)
     for _ in range(rng.integers(0, 3)):  # graphics and people close to the camera
         if rng.random() < 0.4:
             w, h = rng.integers(20, 180), rng.integers(8, 60)

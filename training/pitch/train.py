@@ -1,14 +1,12 @@
 """Trains the pitch network on rendered pictures, logs the curve, keeps the running average of the weights.
 
     python3 train.py --data ../../target/datasets/frames-train --validation ../../target/datasets/frames-validation --out RUN --minutes 75
+
+With --start and --minutes 0, only the batch statistics of a checkpoint are measured.
 """
 
-import argparse
-import csv
 import json
-import queue
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -19,7 +17,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, rate_at
+from common import average_in, batches, begin, curve_of, parser_of, rate_at, with_average
 from dataset import Frames
 from network import PitchNetwork
 from points import CHANNELS, POINTS
@@ -29,24 +27,6 @@ WEIGHT_DECAY = 0.02
 AVERAGE = 0.998
 FOUND = 0.25  # a peak above this is a found point
 NEAR_CELLS = 1.5  # and right within this, cells of 4 pixels
-
-
-def batches(data, rng):
-    """Endless shuffled batches: pictures N×3×H×W 0..1 and maps, made by a thread beside the training."""
-    ready = queue.Queue(4)
-
-    def make():
-        order = []
-        while True:
-            if len(order) < BATCH:
-                data.refresh()
-                weights = np.array([data.weight(index) for index in range(len(data))])
-                order = list(rng.choice(len(data), len(data), p=weights / weights.sum()))
-            ready.put(stack([data.sample(order.pop(), rng) for _ in range(BATCH)]))
-
-    threading.Thread(target=make, daemon=True).start()
-    while True:
-        yield ready.get()
 
 
 def stack(samples):
@@ -105,38 +85,19 @@ def validate(network, samples):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", required=True)
-    parser.add_argument("--validation", required=True)
-    parser.add_argument("--out", required=True)
-    parser.add_argument("--minutes", type=float, default=75.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--rate", type=float, default=3e-3, help="highest learning rate")
-    parser.add_argument("--start", help="checkpoint to go on from; with --minutes 0 only its batch statistics are measured")
-    arguments = parser.parse_args()
-
-    torch.set_num_threads(1)
+    arguments = parser_of(__doc__, minutes=75.0, rate=3e-3).parse_args()
     cv2.setNumThreads(0)
-    torch.set_flush_denormal(True)
-    torch.manual_seed(arguments.seed)
-    rng = np.random.default_rng(arguments.seed)
-    out = Path(arguments.out)
-    out.mkdir(parents=True, exist_ok=True)
+    rng, out = begin(arguments)
     data, validation = Frames(arguments.data), Frames(arguments.validation)
     validation = [validation.sample(index) for index in range(len(validation))]
     print(f"{len(data)} pictures to train on, {len(validation)} to watch the curve", flush=True)
-    network = PitchNetwork().to(memory_format=torch.channels_last)
-    if arguments.start:
-        network.load_state_dict(torch.load(arguments.start))
-    average = PitchNetwork().to(memory_format=torch.channels_last)
-    average.load_state_dict(network.state_dict())
+    network, average = with_average(PitchNetwork(), arguments.start)
     optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
-    curve = csv.writer((out / "curve.csv").open("w", newline=""))
-    curve.writerow(["seconds", "samples", "loss", "validation_point_recall", "validation_point_precision", "validation_line_iou"])
+    curve = curve_of(out, ["loss", "validation_point_recall", "validation_point_precision", "validation_line_iou"])
 
     began, budget = time.time(), arguments.minutes * 60.0
     seen, steps, running, reported = 0, 0, None, 0.0
-    supply = batches(data, rng)
+    supply = batches(data, BATCH, lambda: data.drawn(rng), lambda indices: stack([data.sample(k, rng) for k in indices]))
     while True:
         elapsed = time.time() - began
         part = elapsed / max(budget, 1e-9)

@@ -9,16 +9,14 @@ use protocol::{
     camera::Camera,
     pitch::{GOAL_HEIGHT_M, GOAL_WIDTH_M, Pitch},
 };
-use synthesis::video::{Rate, Video};
 
 use super::{CalibrationError, CameraEstimate};
+use crate::overlay::OverlayWriter;
 
 const MARKINGS: Rgb<u8> = Rgb([255, 30, 30]);
 const GOALS: Rgb<u8> = Rgb([255, 200, 0]);
 /// Length of the straight pieces that lines are drawn in, metres: short, so that distortion shows.
 const PIECE_M: f64 = 0.5;
-/// Quality of an overlay video: x264's CRF, good enough to judge a line by.
-const QUALITY: u8 = 20;
 
 /// Writes frames with the pitch of their camera drawn in: as numbered pictures into the folder `out`, or as a video when it is an
 /// `.mp4` file (`rate`: frames per second as a fraction; the `ffmpeg` program is needed for it). Frames without a camera stay
@@ -34,31 +32,19 @@ pub fn write(
     estimates: &[CameraEstimate],
     pitch: &Pitch,
 ) -> Result<(), CalibrationError> {
-    let failed = |path: &Path, reason: String| CalibrationError::Write { path: path.into(), reason };
-    let as_video = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mp4"));
-    let folder = if as_video { out.parent().filter(|f| !f.as_os_str().is_empty()) } else { Some(out) };
-    if let Some(folder) = folder {
-        std::fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
-    }
-    let mut video = None;
+    let failed = |error: crate::overlay::OverlayError| CalibrationError::Write {
+        path: error.path,
+        reason: error.reason,
+    };
+    let mut writer = OverlayWriter::create(out, rate).map_err(failed)?;
     for ((picture, number), estimate) in pictures.zip(numbers).zip(estimates) {
         let mut picture = picture?;
         if let Some(camera) = &estimate.camera {
             draw(&mut picture, camera, pitch);
         }
-        if !as_video {
-            let path = out.join(format!("{number:06}.png"));
-            picture.save(&path).map_err(|e| failed(&path, e.to_string()))?;
-            continue;
-        }
-        let started = match video.take() {
-            Some(video) => Ok(video),
-            None => Video::start(out, picture.dimensions(), rate, Rate::Quality(QUALITY)),
-        };
-        let pushed = started.and_then(|mut started| started.push(&picture).map(|()| started));
-        video = Some(pushed.map_err(|e| failed(out, e.to_string()))?);
+        writer.push(*number, &picture).map_err(failed)?;
     }
-    video.map_or(Ok(()), |video| video.finish().map_err(|e| failed(out, e.to_string())))
+    writer.finish().map_err(failed)
 }
 
 /// Draws markings and goal frames of a pitch over a frame.

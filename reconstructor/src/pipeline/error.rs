@@ -6,7 +6,8 @@ use thiserror::Error;
 
 use crate::{
     calibration::CalibrationError, depth::DepthError, detection::DetectionError, encode::EncodeError,
-    inference::InferenceError, ingest::IngestError, pose::PoseError, segmentation::SegmentationError,
+    inference::InferenceError, ingest::IngestError, overlay::OverlayError, pose::PoseError,
+    segmentation::SegmentationError,
 };
 
 /// Why a clip was not reconstructed.
@@ -41,6 +42,9 @@ pub enum PipelineError {
     /// The depth network failed.
     #[error(transparent)]
     Depth(#[from] DepthError),
+    /// The pictures for checking by eye cannot be written.
+    #[error(transparent)]
+    Overlay(#[from] OverlayError),
     /// The stream cannot be written.
     #[error(transparent)]
     Encode(#[from] EncodeError),

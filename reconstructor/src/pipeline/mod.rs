@@ -9,6 +9,7 @@ mod air;
 mod error;
 mod frames;
 mod observe;
+mod overlay;
 mod players;
 mod run;
 mod work;
@@ -36,6 +37,8 @@ pub struct ReconstructOptions {
     pub budget: MeshBudget,
     /// Of the paths.
     pub smoothing: Smoothing,
+    /// Where frames go with what was seen drawn in: a folder for pictures, or an `.mp4` file.
+    pub overlay: Option<PathBuf>,
 }
 
 /// Reconstructs a clip into a stream.
@@ -54,6 +57,9 @@ pub fn reconstruct(
     let Seen { detections, cameras, people, tracks, members, ball, lifts } = run.observe()?;
     let masks = run.segment(&people, &tracks)?;
     let masks = players::by_frame(&masks, &tracks, people.len());
+    if let Some(out) = &options.overlay {
+        run.overlay(out, &cameras, &masks, &ball)?;
+    }
     let depths = run.depth(&cameras, &people, &masks)?;
     let paths = run.smooth(&people, &tracks, options.smoothing);
     let figures = run.write(&write::Scene {
