@@ -8,7 +8,6 @@ N×96×64, both 0..255.
 """
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -18,48 +17,14 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
 import prepass
+import rendered
 from view import Person, Window, stack
 
 VISIBLE_MIN = 0.25  # as the measure counts people
 HEIGHT_MIN_PX = 17.0
 POSE_MIN = 0.3
-OFF_CENTRE, SURE, NARROW = 0.12, 0.5, 0.8  # as reconstructor/src/pose
 SAME_PERSON = 0.12  # below this overlap the pose is another person's
 SHIFT, SCALE = 0.03, 0.06  # standard deviations of a window's place (shares of the box) and logarithm of its size
-
-
-def frames(folder, every):
-    """Picture, people and map of every frame that is no close-up."""
-    folder = Path(folder)
-    rows = [json.loads(line) for line in (folder / "frames.jsonl").open()]
-    clip = cv2.VideoCapture(str(folder / "clip.mp4")) if (folder / "clip.mp4").exists() else None
-    for number, row in enumerate(rows):
-        picture = clip.read()[1] if clip else None
-        if number % every or row["shot"]["kind"] == "close-up" or row["shot"].get("mixed_with"):
-            continue
-        name = f"{row['frame']:06}" if clip else row["name"]
-        if not clip:
-            picture = cv2.imread(str(folder / "images" / f"{name}.jpg"))
-        labels = cv2.imread(str(folder / "maps" / f"{name}-people.png"), cv2.IMREAD_UNCHANGED)
-        if picture is not None and labels is not None:
-            yield picture[..., ::-1].copy(), row["people"], labels
-
-
-def look(session, picture, box):
-    """The pose network as the product asks it: once more from the hips, or narrower in a tangle."""
-    side = max(box[2] - box[0], box[3] - box[1])
-    best = prepass.look(session, picture, box)
-    hips = best.joints[23:25].mean(0)
-    centre = np.array([box[0] + box[2], box[1] + box[3]]) / 2
-    inside = (np.abs(hips - centre) < [0.25 * (box[2] - box[0]), 0.4 * (box[3] - box[1])]).all()
-    around = lambda middle, side: [*(middle - side / 2), *(middle + side / 2)]
-    if not inside:
-        second = prepass.look(session, picture, around(centre, side * NARROW))
-        return second if second.flag > best.flag else best
-    if np.linalg.norm(hips - centre) / (prepass.BOX_MARGIN * side) > OFF_CENTRE or best.flag < SURE:
-        second = prepass.look(session, picture, around(hips, side))
-        return second if second.flag > best.flag - 0.1 else best
-    return best
 
 
 def people(session, picture, true_people, rng):
@@ -69,7 +34,7 @@ def people(session, picture, true_people, rng):
         if not true["in_view"] or true["visible_share"] < 0.2 or box[3] - box[1] < HEIGHT_MIN_PX * 0.7:
             continue
         box += rng.normal(0.0, prepass.BOX_NOISE * max(box[2] - box[0], box[3] - box[1]), 4)
-        seen = look(session, picture, box)
+        seen = rendered.look_again(session, picture, box)
         person = Person(seen.joints, seen.visibility, seen.mask, seen.first)
         if person.usable and seen.flag >= POSE_MIN:
             yield person, true
@@ -87,7 +52,7 @@ def main():
     rng = np.random.default_rng(arguments.seed)
     session = prepass.load(arguments.model)
     windows, masks = [], []
-    for picture, true_people, labels in frames(arguments.frames, arguments.every):
+    for picture, true_people, labels in rendered.frames(arguments.frames, arguments.every):
         found = list(people(session, picture, true_people, rng))
         for person, true in found:
             height = true["box_px"][3] - true["box_px"][1]

@@ -214,6 +214,8 @@ impl<'a> Run<'a> {
         detections: &[Vec<Detection>],
         cameras: &[CameraEstimate],
     ) -> Result<Vec<Vec<Person>>, PipelineError> {
+        let refiner = inference::model_path(pose::JOINTS_MODEL)?;
+        self.fingerprint = self.fingerprint.clone().with_file(&refiner)?;
         let results = self.results(Stage::Pose, pose::MODEL, &[])?;
         let wanted: Vec<bool> = cameras.iter().map(|estimate| estimate.camera.is_some()).collect();
         let pitch = self.pitch;

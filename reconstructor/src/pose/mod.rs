@@ -7,6 +7,7 @@
 mod blazepose;
 mod ground;
 mod looks;
+mod refine;
 mod silhouette;
 mod standing;
 
@@ -27,6 +28,7 @@ use crate::{
 
 /// File name of the pose network in `assets/models`.
 pub const MODEL: &str = "blazepose_full.onnx";
+pub use refine::MODEL as JOINTS_MODEL;
 
 /// Joints of the pose network, in its order: BlazePose's 33 landmarks.
 pub const JOINTS: usize = 33;
@@ -173,19 +175,20 @@ pub enum PoseError {
     Inference(#[from] InferenceError),
 }
 
-/// The pose network; one per thread.
+/// The pose network and the one that refines its joints; one per thread.
 #[derive(Debug)]
 pub struct PoseEstimator {
     model: Model,
+    refiner: Model,
 }
 
 impl PoseEstimator {
-    /// Loads the network.
+    /// Loads the networks.
     ///
     /// # Errors
-    /// When ONNX Runtime or the model is missing or unusable.
+    /// When ONNX Runtime or a model is missing or unusable.
     pub fn load() -> Result<Self, PoseError> {
-        Ok(Self { model: Model::load_shipped(MODEL)? })
+        Ok(Self { model: Model::load_shipped(MODEL)?, refiner: Model::load_shipped(refine::MODEL)? })
     }
 
     /// What the network sees in one box, wherever it stands and however sure: for measuring the stages that build on poses.
@@ -224,7 +227,8 @@ impl PoseEstimator {
             // Part of a body found again, or somebody mostly behind another: only a pose of its own makes it a person.
             let covered = people.iter().any(|other| covers(&other.bounds, &detection.bounds));
             let clear = detection.score >= CLEAR && !covered;
-            let seen = self.look_again(picture, square, &detection.bounds, clear)?;
+            let mut seen = self.look_again(picture, square, &detection.bounds, clear)?;
+            refine::refine(&mut self.refiner, &mut seen.joints)?;
             let fresh = |person: &Person| !people.iter().any(|other| same_person(other, person, camera));
             let posed = person_from(&seen, detection, camera, pitch).filter(fresh);
             let unposed = || clear.then(|| standing::in_box(&seen, detection, camera, pitch)).flatten();
