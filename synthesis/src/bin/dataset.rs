@@ -8,7 +8,7 @@ use synthesis::{
     shots::Shots,
 };
 
-const USAGE: &str = "usage: dataset depth  --out DIR --count N [--seed S] [--split train|validation|test] [--motions FILE] [--shard N] [--height LOW..HIGH]
+const USAGE: &str = "usage: dataset depth  --out DIR --count N [--seed S] [--split train|validation|test] [--motions FILE] [--shard N] [--height LOW..HIGH] [--numbers LOW..HIGH]
        dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--per-match N] [--maps yes|no] [--kinds KIND,KIND,…]
 
 depth writes shard-NNNN/{crops.npy, mask.npy, offset_mm.npy, meta.jsonl}: rendered players for the depth network.
@@ -46,6 +46,7 @@ fn depth(mut arguments: impl Iterator<Item = String>) -> Option<DepthOptions> {
         split: Split::Train,
         motions: None,
         height_px: [30.0, 160.0],
+        numbers: [1, 39],
     };
     while let Some(name) = arguments.next() {
         let value = arguments.next()?;
@@ -59,6 +60,10 @@ fn depth(mut arguments: impl Iterator<Item = String>) -> Option<DepthOptions> {
             "--height" => {
                 let (low, high) = value.split_once("..")?;
                 options.height_px = [low.parse().ok()?, high.parse().ok()?];
+            }
+            "--numbers" => {
+                let (low, high) = value.split_once("..")?;
+                options.numbers = [low.parse().ok()?, high.parse().ok()?];
             }
             _ => return None,
         }

@@ -22,6 +22,7 @@ pub(super) struct Cast {
 
 impl Cast {
     pub(super) fn new(base: &BaseBody, options: &DepthOptions, shard: usize, size: usize) -> Self {
+        let [lowest, highest] = options.numbers;
         let figures = (0..size)
             .into_par_iter()
             .map(|k| {
@@ -36,7 +37,7 @@ impl Cast {
                 let build = Build::random(&mut Pcg64Mcg::seed_from_u64(0xB0D1_0000 + u64::from(body_id)));
                 let mut kit_rng = Pcg64Mcg::seed_from_u64(0x5117_0000 + u64::from(kit_id));
                 let kit = Kit::random(&mut kit_rng, format!("kit{kit_id}"));
-                let number = rng.random_bool(0.85).then(|| rng.random_range(1..40));
+                let number = rng.random_bool(0.85).then(|| rng.random_range(lowest..=highest));
                 let outfit = Outfit::random(&mut rng, kit, number, build.female > 0.5);
                 (dress(base, base.shape(&build), outfit, Detail::Close), body_id)
             })

@@ -59,12 +59,18 @@ pub struct DepthOptions {
     pub motions: Option<PathBuf>,
     /// Height of the players in the picture, pixels: smallest and largest.
     pub height_px: [f32; 2],
+    /// Shirt numbers: lowest and highest.
+    pub numbers: [u8; 2],
 }
 
 /// Writes the shards; `progress` is called with the number of finished samples. A finished shard (its `meta.jsonl` is
 /// written last) is kept when the command runs again.
 pub fn depth_crops(options: &DepthOptions, progress: impl Fn(usize) + Sync) -> Result<(), SynthesisError> {
     let [low, high] = options.height_px;
+    let [lowest, highest] = options.numbers;
+    if !(1..=99).contains(&lowest) || !(lowest..=99).contains(&highest) {
+        return Err(SynthesisError::Options("shirt numbers must be of 1 to 99 and in order".into()));
+    }
     if options.shard == 0 || options.count == 0 || !(low > 4.0 && high >= low && high < 1000.0) {
         return Err(SynthesisError::Options(
             "count, shard size and player heights must be positive and in order".into(),
@@ -129,6 +135,7 @@ mod tests {
             split,
             motions: None,
             height_px: [40.0, 120.0],
+            numbers: [1, 39],
         }
     }
 

@@ -36,6 +36,8 @@ pub struct SampleMeta {
     pub body: u32,
     /// Kit.
     pub kit: String,
+    /// Shirt number, when there is one.
+    pub number: Option<u8>,
     /// Camera of the whole 1280×720 picture.
     pub camera: Camera,
     /// Clip pixel of the crop's first pixel centre (x, y), and clip pixels per crop pixel.
@@ -211,6 +213,7 @@ pub(super) fn draw(
         phase,
         body: cast.figures[main].1,
         kit: cast.figures[main].0.outfit.kit.id.clone(),
+        number: cast.figures[main].0.outfit.number,
         camera,
         crop: [corner.x, corner.y, scale],
         anchor_m: anchor.to_array(),

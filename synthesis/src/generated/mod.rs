@@ -77,18 +77,34 @@ fn attack(team: u8) -> f32 {
     if team == 0 { 1.0 } else { -1.0 }
 }
 
+/// Shirt numbers of a team: mostly a 1 in goal, most others below 30.
+fn squad(seed: u64, team: u8, players: usize) -> Vec<u8> {
+    // A generator of its own, so that nothing else of the match depends on it.
+    let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5AAD_0000 ^ u64::from(team));
+    let mut numbers = vec![if rng.random_bool(0.7) { 1 } else { rng.random_range(12..=40) }];
+    while numbers.len() < players {
+        let highest = if rng.random_bool(0.75) { 30 } else { 99 };
+        let number = rng.random_range(2..=highest);
+        if !numbers.contains(&number) {
+            numbers.push(number);
+        }
+    }
+    numbers
+}
+
 impl Game {
     fn new(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x6A3E);
         let mut people = Vec::new();
         for team in 0..2u8 {
             let formation = FORMATIONS[rng.random_range(0..FORMATIONS.len())];
+            let numbers = squad(seed, team, formation.iter().map(|(_, line)| line.len()).sum());
             let places = formation.iter().flat_map(|(x, line)| line.iter().map(|z| Vec2::new(*x, *z)));
             for (index, place) in places.enumerate() {
                 let keeper = index == 0;
                 let home = place * attack(team)
                     + Vec2::new(rng.random_range(-2.0..2.0), rng.random_range(-2.0..2.0));
-                let number = if index == 0 { 1 } else { index as u8 + 1 };
+                let number = numbers.get(index).copied().unwrap_or(1);
                 let follow = if keeper { Vec2::new(0.06, 0.08) } else { Vec2::new(0.60, 0.42) };
                 let role = if keeper { Role::Goalkeeper } else { Role::Player };
                 people.push(Person::new(role, Some((team, number)), home, follow, &mut rng));
