@@ -5,7 +5,7 @@
 
 `--crops` is a folder that `dataset depth` wrote, `--clip` one of `reconstructor synthesize`. On backs without a number, `--paint` others are painted
 in other hands. Writes `NAME.npz`: x N×48×48×3, the patch with a margin; number, 0 where none can be read; height of the person in pixels; the
-patch's turn; painted or not.
+patch's turn; painted or not; who it is (−1 of painted ones) and the number worn. The number is −1 where it cannot be said whether it can be read.
 """
 
 import argparse
@@ -72,13 +72,14 @@ class Rows:
     def __init__(self):
         self.rows = []
 
-    def add(self, x, number, height, turn, painted):
-        self.rows.append((x.clip(0, 255).round().astype(np.uint8), number, height, turn, painted))
+    def add(self, x, number, height, turn, painted, who=-1, wears=0):
+        number = -1 if number is None else number
+        self.rows.append((x.clip(0, 255).round().astype(np.uint8), number, height, turn, painted, who, wears))
 
     def save(self, path):
-        x, number, height, turn, painted = [np.array(column) for column in zip(*self.rows)]
+        x, number, height, turn, painted, who, wears = [np.array(column) for column in zip(*self.rows)]
         path.parent.mkdir(parents=True, exist_ok=True)
-        np.savez(path, x=x, number=number, height=height, turn=turn, painted=painted)
+        np.savez(path, x=x, number=number, height=height, turn=turn, painted=painted, who=who, wears=wears)
         print(f"{path.name}: {len(x)} patches, {(number > 0).sum()} with a number, {painted.sum()} of them painted", flush=True)
 
 
@@ -108,7 +109,7 @@ def painted(crop, mask, meta, project, joints_m, patch, rng):
 
 
 def from_crops(folder, session, paint_count, rng):
-    out = Rows()
+    out, figures = Rows(), {}
     for shard in sorted(Path(folder).glob("shard-*")):
         if not (shard / "meta.jsonl").exists():
             continue
@@ -132,8 +133,8 @@ def from_crops(folder, session, paint_count, rng):
             free = view.sample(mask.astype(np.float32), true, 16, 1 / scale).mean() / 255 if cosine > 0 else 1.0
             apart = np.linalg.norm(patch.middle - true.middle) / (true.cell * view.CELLS)
             number = label(meta["number"], cosine, free, apart)
-            if number is not None:
-                out.add(view.sample(crop, patch, MARGIN_CELLS, 1 / scale), number, meta["height_px"], patch.turn, False)
+            who = figures.setdefault((shard.name, meta["body"], meta["kit"], meta["number"]), len(figures))
+            out.add(view.sample(crop, patch, MARGIN_CELLS, 1 / scale), number, meta["height_px"], patch.turn, False, who, meta["number"] or 0)
             if meta["number"] is None and label(1, cosine, free, apart):
                 project = projection(meta["camera"])
                 for _ in range(paint_count):
@@ -171,8 +172,12 @@ def from_clip(folder, every, session, rng):
                 continue
             apart = np.linalg.norm(patch.middle - true.middle) / (true.cell * view.CELLS)
             number = label(who[person["id"]].get("number"), cosine, person["visible_share"], apart)
-            if number is not None:
-                out.add(view.sample(picture, patch, MARGIN_CELLS), number, height, patch.turn, False)
+            bottom = person["box_px"][3]
+            nearer = [other["box_px"] for other in row["people"] if other is not person and other["box_px"][3] > bottom]
+            if any(b[0] <= patch.middle[0] <= b[2] and b[1] <= patch.middle[1] <= b[3] for b in nearer):
+                continue
+            wears = who[person["id"]].get("number") or 0
+            out.add(view.sample(picture, patch, MARGIN_CELLS), number, height, patch.turn, False, person["id"], wears)
     return out
 
 

@@ -18,12 +18,16 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this fold
 
 from common import average_in, rate_at
 from network import NumberNetwork, split
+from paint import colours, glyphs
 from view import CELLS
 
 BATCH = 64
 WEIGHT_DECAY = 0.02
 AVERAGE = 0.998
 LEGIBLE = 0.7  # share of a batch that shows a number
+FRESH = 0.5  # share of the numbers in a batch that are painted while training, on patches that show none
+SHEETS = 3000  # of them in as many hands
+PER_M = 56.0  # cells per metre of an upright back
 HEIGHTS = [(30, 45), (45, 60), (60, 80), (80, 110), (110, 400)]
 
 
@@ -31,11 +35,11 @@ class Patches:
     def __init__(self, folder):
         parts = [np.load(path) for path in sorted(Path(folder).glob("*.npz"))]
         self.x, self.number, self.height, self.turn, self.painted = [
-            np.concatenate([part[name] for part in parts]) for name in ("x", "number", "height", "turn", "painted")
+            np.concatenate([part[name][part["number"] >= 0] for part in parts]) for name in ("x", "number", "height", "turn", "painted")
         ]
 
     def draw(self, count, rng):
-        """Every tens digit as often as every other, none among them, and every units digit; painted and rendered alike."""
+        """Windows, numbers and heights. Every tens digit as often as every other, none among them, and every units digit."""
         if not hasattr(self, "groups"):
             legible = self.number > 0
             self.none = np.nonzero(~legible)[0]
@@ -44,17 +48,57 @@ class Patches:
                 key = (bool(self.painted[index]), int(self.number[index]))
                 self.groups.setdefault(key, []).append(index)
             self.numbers = [[[n for n in range(max(t * 10, 1), t * 10 + 10) if (p, n) in self.groups] for t in range(10)] for p in (False, True)]
-        chosen = []
-        for _ in range(count):
+            self.sheets = [[] for _ in range(10)]
+            for _ in range(SHEETS):
+                tens = int(rng.integers(10))
+                number = int(rng.integers(max(tens * 10, 1), tens * 10 + 10))
+                sheet = glyphs(str(number), rng)
+                self.sheets[tens].append((number, cv2.resize(sheet, (max(sheet.shape[1] // 3, 2), sheet.shape[0] // 3), interpolation=cv2.INTER_AREA)))
+        chosen, fresh = [], {}
+        for place in range(count):
             if rng.random() > LEGIBLE:
                 chosen.append(self.none[rng.integers(len(self.none))])
+                continue
+            if rng.random() < FRESH:
+                # Large ones more often: there is more to learn from them.
+                chosen.append(max(self.none[rng.integers(len(self.none), size=2)], key=lambda index: self.height[index]))
+                sheets = self.sheets[rng.integers(10)]
+                fresh[place] = sheets[rng.integers(len(sheets))]
                 continue
             painted = bool(rng.random() < 0.4) and any(self.numbers[True])
             tens = [numbers for numbers in self.numbers[painted] if numbers]
             numbers = tens[rng.integers(len(tens))]
             group = self.groups[painted, numbers[rng.integers(len(numbers))]]
             chosen.append(group[rng.integers(len(group))])
-        return np.array(chosen)
+        windows, numbers = self.x[chosen], self.number[chosen].copy()
+        for place, (number, sheet) in fresh.items():
+            windows[place] = over(windows[place], sheet, number < 10, self.height[chosen[place]], rng)
+            numbers[place] = number
+        return windows, numbers, self.height[chosen]
+
+
+def over(window, sheet, one_digit, height, rng):
+    """A number over a patch, as far as the patch's cells and the clip's pixels are known: flat, but turned, sheared and narrowed."""
+    tall = rng.uniform(0.17, 0.33)
+    wide = min(tall * sheet.shape[1] / sheet.shape[0] * rng.uniform(0.75, 1.15), 0.2 if one_digit else 0.34) * rng.uniform(0.55, 1.0)
+    fine = 3
+    size = np.array([wide, tall]) * PER_M * fine
+    turn = np.deg2rad(rng.normal(0, 5))
+    across = np.array([np.cos(turn), np.sin(turn) + rng.normal(0, 0.06)]) * size[0] / sheet.shape[1]
+    down = np.array([-np.sin(turn) + rng.normal(0, 0.04), np.cos(turn)]) * size[1] / sheet.shape[0]
+    middle = (np.array([len(window) / 2, len(window) / 2 - 11 + (rng.uniform(0.01, 0.11) + tall / 2) * PER_M]) + rng.normal(0, [2.0, 1.0])) * fine
+    corner = middle - across * sheet.shape[1] / 2 - down * sheet.shape[0] / 2
+    cover = cv2.warpAffine(sheet, np.array([[across[0], down[0], corner[0]], [across[1], down[1], corner[1]]]), (len(window) * fine,) * 2, flags=cv2.INTER_AREA)
+    # Only as sharp as the clip's pixels and its lens allow.
+    pixels = int(np.clip(len(window) * height / 99, 8, len(window) * fine))
+    cover = cv2.resize(cover, (pixels, pixels), interpolation=cv2.INTER_AREA)
+    cover = cv2.GaussianBlur(cover, (0, 0), rng.uniform(0.25, 0.9))
+    cover = cv2.resize(cover, window.shape[:2], interpolation=cv2.INTER_LINEAR)[..., None]
+    image = window.astype(np.float32) / 255
+    shirt = np.median(image[16:32, 16:32].reshape(-1, 3), 0)
+    ink, rim = colours(shirt, rng)
+    shade = (cv2.GaussianBlur(image, (0, 0), 4) @ np.array([0.299, 0.587, 0.114], np.float32) / max(shirt @ [0.299, 0.587, 0.114], 0.05)).clip(0.6, 1.4)[..., None]
+    return ((image * (1 - cover) + (ink * shade).clip(0, 1) * cover) * 255).clip(0, 255).astype(np.uint8)
 
 
 def targets(number):
@@ -73,14 +117,14 @@ def varied(windows, heights, rng):
     out = np.empty((len(windows), 3, CELLS, CELLS), np.float32)
     for k, window in enumerate(windows):
         image = window.astype(np.float32)
-        if rng.random() < 0.35 and heights[k] > 45:
-            part = max(rng.uniform(0.35, 0.9), 36 / heights[k])
+        if rng.random() < 0.25 and heights[k] > 50:
+            part = max(rng.uniform(0.5, 0.95), 40 / heights[k])
             # As many pixels as a smaller player has: 0.4 of the height is 48 cells wide.
             pixels = max(int(0.48 * heights[k] * part), 10)
             if pixels < len(image):
                 image = cv2.resize(cv2.resize(image, (pixels, pixels), interpolation=cv2.INTER_AREA), image.shape[:2], interpolation=cv2.INTER_LINEAR)
-        if rng.random() < 0.3:
-            length, angle = rng.uniform(0, 3.0), rng.uniform(0, np.pi)
+        if rng.random() < 0.2:
+            length, angle = rng.uniform(0, 2.5), rng.uniform(0, np.pi)
             kernel = np.zeros((7, 7), np.float32)
             for step in np.linspace(-length / 2, length / 2, 9):
                 kernel[int(round(3 + step * np.sin(angle))), int(round(3 + step * np.cos(angle)))] += 1
@@ -133,8 +177,8 @@ def settle(network, patches, rng, count=30):
         norm.momentum = None
     network.train()
     for _ in range(count):
-        chosen = patches.draw(BATCH, rng)
-        network(varied(patches.x[chosen], patches.height[chosen], rng))
+        windows, _, heights = patches.draw(BATCH, rng)
+        network(varied(windows, heights, rng))
     for norm in norms:
         norm.momentum = 0.1
 
@@ -172,6 +216,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=12.0, help="of processor time")
     parser.add_argument("--rate", type=float, default=3e-3)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--start", help="checkpoint to go on from")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
@@ -183,6 +228,8 @@ def main():
     patches, held = Patches(arguments.data), Patches(arguments.validation)
     print(f"{len(patches.x)} patches to train on, {len(held.x)} to watch the curve", flush=True)
     network, average = NumberNetwork(), NumberNetwork()
+    if arguments.start:
+        network.load_state_dict(torch.load(arguments.start)["network"])
     average.load_state_dict(network.state_dict())
     optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
     curve = csv.writer((out / "curve.csv").open("w", newline=""))
@@ -205,8 +252,8 @@ def main():
             break
         for group in optimizer.param_groups:
             group["lr"] = rate_at(arguments.rate, part, steps, warm_up=60)
-        chosen = patches.draw(BATCH, rng)
-        loss = loss_of(network(varied(patches.x[chosen], patches.height[chosen], rng)), patches.number[chosen])
+        windows, numbers, heights = patches.draw(BATCH, rng)
+        loss = loss_of(network(varied(windows, heights, rng)), numbers)
         optimizer.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)

@@ -44,6 +44,9 @@ pub struct WhoTruth {
     pub team: Option<String>,
     /// As in the manifest.
     pub role: String,
+    /// Shirt number; none of officials.
+    #[serde(default)]
+    pub number: Option<u8>,
 }
 
 /// What holds for the whole clip.

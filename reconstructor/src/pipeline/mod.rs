@@ -1,4 +1,4 @@
-//! The whole way from a clip to a stream: `ingest → shots → detection → calibration → pose → tracking → teams → jumps → ball → segmentation → depth →
+//! The whole way from a clip to a stream: `ingest → shots → detection → calibration → pose → tracking → teams → numbers → jumps → ball → segmentation → depth →
 //! mesh → trajectory → encode`.
 //!
 //! Costly stages keep their results frame by frame in the work folder and take them from there when the clip, the options
@@ -8,6 +8,7 @@
 mod air;
 mod error;
 mod frames;
+mod numbers;
 mod observe;
 mod overlay;
 mod players;
@@ -54,7 +55,7 @@ pub fn reconstruct(
     // A folder that cannot be written is known now, not after the long work.
     std::fs::create_dir_all(&options.out)
         .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
-    let Seen { detections, cameras, people, tracks, members, ball, lifts } = run.observe()?;
+    let Seen { detections, cameras, people, tracks, members, numbers, ball, lifts } = run.observe()?;
     let masks = run.segment(&people, &tracks)?;
     let masks = players::by_frame(&masks, &tracks, people.len());
     if let Some(out) = &options.overlay {
@@ -69,11 +70,12 @@ pub fn reconstruct(
         cameras: &cameras,
         people: &people,
         members: &members,
+        numbers: &numbers,
         masks: &masks,
         depths: &depths,
         paths: &paths,
         ball: &ball,
         heights_m: &air::heights(&lifts, &tracks),
     })?;
-    Ok(run.finish(figures, tracks.len()))
+    Ok(run.finish(figures, tracks.len(), numbers.len()))
 }

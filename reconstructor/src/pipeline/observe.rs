@@ -2,9 +2,9 @@
 //!
 //! [`observe`] stops there, for the measures and for tools that need no stream; a reconstruction goes the same way on.
 
-use std::{ops::Range, path::PathBuf};
+use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
-use protocol::pitch::Pitch;
+use protocol::{manifest::PersonId, pitch::Pitch};
 
 use super::{PipelineError, run::Run};
 use crate::{
@@ -13,6 +13,7 @@ use crate::{
     detection::Detection,
     ingest::Clip,
     jumps::Lift,
+    numbers::ShirtNumber,
     pose::Person,
     report::Reporter,
     shots::ShotList,
@@ -65,6 +66,8 @@ pub struct Seen {
     pub tracks: Vec<Track>,
     /// Team and role of every track, in the same order.
     pub members: Vec<Member>,
+    /// Shirt numbers of those of whom they could be read.
+    pub numbers: BTreeMap<PersonId, ShirtNumber>,
     /// The ball in every frame.
     pub ball: Vec<Option<BallEstimate>>,
     /// Who is in the air.
@@ -81,9 +84,10 @@ impl Run<'_> {
         let mut people = self.pose(&detections, &cameras)?;
         let (tracks, members) = self.track(&people, &cameras)?;
         self.smooth_poses(&mut people, &tracks, &cameras);
+        let numbers = self.numbers(&people, &tracks, &members)?;
         let lifts = self.jumps(&mut people, &tracks, &cameras);
         let ball = self.ball(&balls, &cameras, &people);
-        Ok(Seen { detections, cameras, people, tracks, members, ball, lifts })
+        Ok(Seen { detections, cameras, people, tracks, members, numbers, ball, lifts })
     }
 }
 

@@ -237,7 +237,12 @@ impl<'a> Run<'a> {
     }
 
     /// The report.
-    pub(super) fn finish(self, figures: Vec<FrameFigures>, people: usize) -> ReconstructReport {
-        self.reporter.finish(figures, people)
+    pub(super) fn finish(
+        self,
+        figures: Vec<FrameFigures>,
+        people: usize,
+        numbers: usize,
+    ) -> ReconstructReport {
+        self.reporter.finish(figures, people, numbers)
     }
 }

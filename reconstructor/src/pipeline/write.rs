@@ -26,6 +26,7 @@ use crate::{
     encode::{StreamFrame, StreamHeader, StreamWriter},
     ingest::Clip,
     mesh::{self, BodySurface, Figure, MeshBudget},
+    numbers::ShirtNumber,
     pose::Person,
     report::{Failure, FrameFigures, Loss, Progress, Stage},
     teams::Member,
@@ -40,6 +41,7 @@ pub(super) struct Scene<'a> {
     pub(super) cameras: &'a [CameraEstimate],
     pub(super) people: &'a [Vec<Person>],
     pub(super) members: &'a [Member],
+    pub(super) numbers: &'a BTreeMap<PersonId, ShirtNumber>,
     pub(super) masks: &'a [FrameMasks<'a>],
     pub(super) depths: &'a Results,
     pub(super) paths: &'a BTreeMap<PersonId, Path>,
@@ -96,14 +98,15 @@ impl Run<'_> {
     }
 
     fn header(&self, scene: &Scene<'_>) -> StreamHeader {
+        let number_of = |member: &Member| scene.numbers.get(&member.person);
         let people = scene.members.iter().map(|member| StreamPerson {
             id: member.person,
             team: member.team.map(|team| team.name().to_owned()),
             team_confidence: member.team.map(|_| member.team_confidence as f32),
             role_confidence: member.role.map(|_| member.role_confidence as f32),
             role: member.role.map(|role| role.name().to_owned()),
-            number: None,
-            number_confidence: None,
+            number: number_of(member).map(|read| read.number),
+            number_confidence: number_of(member).map(|read| read.confidence as f32),
             shirt_rgb: member.shirt_rgb,
         });
         StreamHeader {

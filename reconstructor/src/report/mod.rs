@@ -26,6 +26,8 @@ pub enum Stage {
     Pose,
     /// Who is who over time.
     Tracking,
+    /// Shirt numbers.
+    Numbers,
     /// Who is in the air.
     Jumps,
     /// The ball.
@@ -44,12 +46,13 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Ingest,
         Self::Detection,
         Self::Calibration,
         Self::Pose,
         Self::Tracking,
+        Self::Numbers,
         Self::Jumps,
         Self::Ball,
         Self::Segmentation,
@@ -68,6 +71,7 @@ impl Stage {
             Self::Calibration => "calibration",
             Self::Pose => "pose",
             Self::Tracking => "tracking",
+            Self::Numbers => "numbers",
             Self::Jumps => "jumps",
             Self::Ball => "ball",
             Self::Segmentation => "segmentation",
@@ -149,6 +153,8 @@ pub struct ReconstructReport {
     pub people_with_mesh_mean: f64,
     /// People followed over time.
     pub people: usize,
+    /// Of them, those whose shirt number was read.
+    pub numbers_read: usize,
     /// Wall-clock seconds of this run.
     pub seconds: f64,
     /// Wall-clock seconds of this run per frame of the range.
@@ -234,9 +240,14 @@ impl Reporter {
         &self.failures
     }
 
-    /// The report over the given frames and `people` tracks.
+    /// The report over the given frames and `people` tracks, of which `numbers_read` have a shirt number.
     #[must_use]
-    pub fn finish(&self, per_frame: Vec<FrameFigures>, people: usize) -> ReconstructReport {
+    pub fn finish(
+        &self,
+        per_frame: Vec<FrameFigures>,
+        people: usize,
+        numbers_read: usize,
+    ) -> ReconstructReport {
         let frames = per_frame.len();
         let residuals: Vec<f64> = per_frame.iter().filter_map(|f| f.line_residual_median_px).collect();
         let with_mesh: usize = per_frame.iter().map(|f| f.people_with_mesh).sum();
@@ -248,6 +259,7 @@ impl Reporter {
             line_residual_worst_px: residuals.iter().copied().reduce(f64::max),
             people_with_mesh_mean: with_mesh as f64 / frames.max(1) as f64,
             people,
+            numbers_read,
             seconds,
             seconds_per_frame: seconds / frames.max(1) as f64,
             stages: self.stages.clone(),
@@ -318,8 +330,9 @@ mod tests {
     #[test]
     fn the_summary_counts_frames_without_a_camera() {
         let frames = vec![frame(5, Some(1.0), 10), frame(6, None, 0), frame(7, Some(3.0), 14)];
-        let report = Reporter::quiet().finish(frames, 16);
+        let report = Reporter::quiet().finish(frames, 16, 5);
         assert_eq!((report.frames, report.cameras_solved, report.people), (3, 2, 16));
+        assert_eq!(report.numbers_read, 5);
         assert_eq!(report.line_residual_median_px, Some(2.0));
         assert_eq!(report.line_residual_worst_px, Some(3.0));
         assert_eq!(report.people_with_mesh_mean, 8.0);
@@ -337,7 +350,7 @@ mod tests {
                 reason: "too small".into(),
             });
         }
-        let report = reporter.finish(Vec::new(), 0);
+        let report = reporter.finish(Vec::new(), 0, 0);
         assert_eq!(report.failures.len(), FAILURES_KEPT);
         assert_eq!(report.failures_not_listed, 3);
     }

@@ -5,6 +5,7 @@
 //! ours that fit best to somebody else are neither right nor wrong, as the MOT Challenge treats distractors. Frames in which two
 //! pictures are mixed do not count.
 
+mod numbers;
 mod scores;
 mod truth;
 
@@ -16,6 +17,7 @@ use std::{
 
 use serde::Serialize;
 
+pub use numbers::NumberFigures;
 pub use scores::{FrameBoxes, Matches, Scores, TrackedBox, scores};
 
 use super::frame_truth::TruthError;
@@ -42,6 +44,9 @@ pub struct TrackingFigures {
     pub team_accuracy: f64,
     /// Share of all matched boxes that have the right role; no role is wrong.
     pub role_accuracy: f64,
+    /// Shirt numbers.
+    #[serde(flatten)]
+    pub numbers: NumberFigures,
     /// Every shot alone.
     pub shots: Vec<ShotScores>,
     /// The same people linked without identities over cuts.
@@ -140,6 +145,7 @@ fn figures(truth: &Truth, looked: &Observation) -> TrackingFigures {
         scores,
         team_accuracy: team_accuracy(truth, &looked.seen.members, &matches),
         role_accuracy: role_accuracy(truth, &looked.seen.members, &matches),
+        numbers: numbers::figures(truth, &looked.seen.numbers, &matches),
         shots: by_shot(&ours),
         within_shots: whole(&within).0,
         greedy: whole(&greedy).0,
@@ -254,7 +260,7 @@ mod tests {
 
     fn truth() -> Truth {
         let person = |(id, team, role): (u32, Option<&str>, &str)| {
-            (id, WhoTruth { id, team: team.map(str::to_owned), role: role.to_owned() })
+            (id, WhoTruth { id, team: team.map(str::to_owned), role: role.to_owned(), number: None })
         };
         let people = [
             (0, Some("home"), "player"),
