@@ -44,6 +44,8 @@ pub(crate) fn cargo_test(arguments: &[&str], variable: &str) -> Result<()> {
 /// Every dependency's licence against `deny.toml`.
 fn licences() -> Result<()> {
     let cargo_deny = setup::cargo_deny()?;
+    // It looks at the crates of every platform; a build fetches only those of this one.
+    cargo(&["fetch", "--locked"])?;
     run_command(
         std::process::Command::new(cargo_deny)
             .args(["--offline", "check", "licenses", "bans", "sources"])
