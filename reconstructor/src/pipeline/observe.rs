@@ -80,8 +80,9 @@ impl Run<'_> {
         let found = self.detect()?;
         let (detections, balls): (Vec<_>, Vec<_>) =
             found.into_iter().map(|found| (found.people, found.balls)).unzip();
-        let cameras = self.calibrate(&detections)?;
+        let mut cameras = self.calibrate(&detections)?;
         let mut people = self.pose(&detections, &cameras)?;
+        self.settle_sides(&mut people, &mut cameras);
         let (tracks, members) = self.track(&people, &cameras)?;
         self.smooth_poses(&mut people, &tracks, &cameras);
         let numbers = self.numbers(&people, &tracks, &members)?;

@@ -28,6 +28,16 @@ pub(super) type PersonDepth = Result<DepthMap, String>;
 pub(super) type FrameMasks<'a> = BTreeMap<PersonId, &'a PlayerMask>;
 
 impl Run<'_> {
+    /// Turns shots from behind a goal that stand the wrong way round.
+    pub(super) fn settle_sides(&self, people: &mut [Vec<Person>], cameras: &mut [CameraEstimate]) {
+        for shot in tracking::sides::settle(people, cameras, &self.shots, &self.pitch) {
+            tracing::info!(
+                "shot {}: people before or after it show that its camera stands behind the right goal",
+                shot + 1
+            );
+        }
+    }
+
     /// Who is who, and on whose side.
     pub(super) fn track(
         &mut self,

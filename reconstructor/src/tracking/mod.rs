@@ -10,6 +10,7 @@ mod global;
 mod links;
 mod merge;
 mod motion;
+pub(crate) mod sides;
 mod tracklets;
 
 #[cfg(test)]
