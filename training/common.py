@@ -90,3 +90,41 @@ def average_in(average, network, step, keep):
             mean.lerp_(value, 1 - keep)
         else:
             mean.copy_(value)
+
+
+@torch.no_grad()
+def settle(network, inputs):
+    """Measures the batch statistics of averaged weights anew: their running average is of other weights, and one wild batch spoils it for good."""
+    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
+    for norm in norms:
+        norm.reset_running_stats()
+        norm.momentum = None  # the plain mean over what comes
+    network.train()
+    for given in inputs:
+        network(given)
+    for norm in norms:
+        norm.momentum = 0.1
+
+
+class Chances(torch.nn.Module):
+    """A network that ends in probabilities."""
+
+    def __init__(self, network):
+        super().__init__()
+        self.network = network
+
+    def forward(self, seen):
+        return torch.sigmoid(self.network(seen))
+
+
+def export(text, network, example, names, free, last=lambda network: network):
+    """The command that writes a checkpoint as ONNX: weights into `network`, behind it `last`; `names` of input and output, whose first axis is `free`."""
+    parser = argparse.ArgumentParser(description=text)
+    parser.add_argument("--checkpoint", required=True)
+    parser.add_argument("--out", required=True)
+    arguments = parser.parse_args()
+    network.load_state_dict(torch.load(arguments.checkpoint, map_location="cpu"))
+    axes = {name: {0: free} for name in names}
+    given, told = names
+    whole = last(network).eval()
+    torch.onnx.export(whole, example, arguments.out, opset_version=15, dynamic_axes=axes, input_names=[given], output_names=[told])

@@ -1,5 +1,6 @@
 """Rendered pictures with their truth, and the pose network's look at the people in them."""
 
+import argparse
 import json
 from pathlib import Path
 
@@ -9,6 +10,19 @@ import numpy as np
 import prepass
 
 OFF_CENTRE, SURE, NARROW = 0.12, 0.5, 0.8  # as reconstructor/src/pose
+
+
+def begin(text, seed):
+    """The arguments of a preparation, its generator of numbers, and the pose network."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", required=True)
+    parser.add_argument("--out", required=True)
+    parser.add_argument("--every", type=int, default=1, help="one frame of so many")
+    parser.add_argument("--model", default=str(Path(__file__).resolve().parents[1] / "assets/models/blazepose_full.onnx"))
+    parser.add_argument("--seed", type=int, default=seed)
+    arguments = parser.parse_args()
+    cv2.setNumThreads(1)
+    return arguments, np.random.default_rng(arguments.seed), prepass.load(arguments.model)
 
 
 def frames(folder, every=1):

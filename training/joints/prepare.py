@@ -5,11 +5,9 @@
 `--frames` as in ../masks/prepare.py. Writes read N×33×3 (x, y in pixels, visibility) and true N×33×2.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
@@ -23,16 +21,7 @@ POSE_MIN = 0.3
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", required=True)
-    parser.add_argument("--out", required=True)
-    parser.add_argument("--every", type=int, default=1, help="one frame of so many")
-    parser.add_argument("--model", default=str(Path(__file__).resolve().parents[2] / "assets/models/blazepose_full.onnx"))
-    parser.add_argument("--seed", type=int, default=3)
-    arguments = parser.parse_args()
-    cv2.setNumThreads(1)
-    rng = np.random.default_rng(arguments.seed)
-    session = prepass.load(arguments.model)
+    arguments, rng, session = rendered.begin(__doc__, seed=3)
     read, true = [], []
     for picture, people, _ in rendered.frames(arguments.frames, arguments.every):
         for person in people:

@@ -7,11 +7,9 @@
 N×96×64, both 0..255.
 """
 
-import argparse
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
@@ -41,16 +39,7 @@ def people(session, picture, true_people, rng):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frames", required=True)
-    parser.add_argument("--out", required=True)
-    parser.add_argument("--every", type=int, default=1, help="one frame of so many")
-    parser.add_argument("--model", default=str(Path(__file__).resolve().parents[2] / "assets/models/blazepose_full.onnx"))
-    parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
-    cv2.setNumThreads(1)
-    rng = np.random.default_rng(arguments.seed)
-    session = prepass.load(arguments.model)
+    arguments, rng, session = rendered.begin(__doc__, seed=1)
     windows, masks = [], []
     for picture, true_people, labels in rendered.frames(arguments.frames, arguments.every):
         found = list(people(session, picture, true_people, rng))

@@ -13,7 +13,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, begin, curve_of, parser_of, rate_at, with_average
+from common import average_in, begin, curve_of, parser_of, rate_at, settle, with_average
 from network import MaskNetwork
 
 BATCH = 16
@@ -84,19 +84,11 @@ def validate(network, windows, masks):
     return found.mean(), before.mean(), found[tangled].mean(), before[tangled].mean()
 
 
-@torch.no_grad()
-def settle(network, windows, masks, rng, count=30):
-    """Measures the batch statistics of averaged weights anew."""
-    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
-    for norm in norms:
-        norm.reset_running_stats()
-        norm.momentum = None
-    network.train()
+def drawn(windows, masks, rng, count):
+    """So many batches of varied windows."""
     for _ in range(count):
         chosen = rng.choice(len(windows), BATCH)
-        network(varied(windows[chosen], masks[chosen], rng)[0])
-    for norm in norms:
-        norm.momentum = 0.1
+        yield varied(windows[chosen], masks[chosen], rng)[0]
 
 
 def main():
@@ -116,7 +108,7 @@ def main():
         part = elapsed / max(budget, 1e-9)
         if part >= 1.0 or elapsed - reported >= min(60.0, budget / 3):
             reported = elapsed
-            settle(average, windows, masks, rng)
+            settle(average, drawn(windows, masks, rng, 30))
             found = validate(average, *held)
             curve.writerow([f"{elapsed:.0f}", steps * BATCH, f"{running or 0:.4f}", *(f"{value:.4f}" for value in found)])
             print(

@@ -16,7 +16,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, rate_at
+from common import average_in, rate_at, settle
 from network import NumberNetwork, split
 from paint import colours, glyphs
 from view import CELLS
@@ -168,19 +168,11 @@ def right(logits, number):
     return (tens.argmax(1) * 10 + units.argmax(1)).numpy() == number
 
 
-@torch.no_grad()
-def settle(network, patches, rng, count=30):
-    """Measures the batch statistics of averaged weights anew."""
-    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
-    for norm in norms:
-        norm.reset_running_stats()
-        norm.momentum = None
-    network.train()
+def drawn(patches, rng, count):
+    """So many batches of varied patches."""
     for _ in range(count):
         windows, _, heights = patches.draw(BATCH, rng)
-        network(varied(windows, heights, rng))
-    for norm in norms:
-        norm.momentum = 0.1
+        yield varied(windows, heights, rng)
 
 
 def temperatures(logits, number):
@@ -241,7 +233,7 @@ def main():
         part = elapsed / budget
         if part >= 1.0 or elapsed - reported >= min(60.0, budget / 3):
             reported = elapsed
-            settle(average, patches, rng)
+            settle(average, drawn(patches, rng, 30))
             found = logits_of(average, held)
             shown = (held.number > 0) & ~held.painted
             loss, share = loss_of(found, held.number).item(), right(found, held.number)[shown].mean()

@@ -17,7 +17,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, batches, begin, curve_of, parser_of, rate_at, with_average
+from common import average_in, batches, begin, curve_of, parser_of, rate_at, settle, with_average
 from dataset import Frames
 from network import PitchNetwork
 from points import CHANNELS, POINTS
@@ -43,20 +43,6 @@ def loss_of(logits, maps):
     lines = focal[:, POINTS:].sum() / wanted[:, POINTS:].sum().clamp(min=100.0)
     area = functional.binary_cross_entropy_with_logits(logits[:, -1], maps[:, -1])
     return points + lines + 0.3 * area
-
-
-@torch.no_grad()
-def settle(network, supply, count=24):
-    """Measures the batch statistics of averaged weights anew: their running average is of other weights, and one wild batch spoils it for good."""
-    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
-    for norm in norms:
-        norm.reset_running_stats()
-        norm.momentum = None  # the plain mean over what comes
-    network.train()
-    for _ in range(count):
-        network(next(supply)[0])
-    for norm in norms:
-        norm.momentum = 0.1
 
 
 @torch.no_grad()
@@ -103,7 +89,7 @@ def main():
         part = elapsed / max(budget, 1e-9)
         if part >= 1.0 or elapsed - reported >= min(240.0, budget / 3):
             reported = elapsed
-            settle(average, supply)
+            settle(average, (next(supply)[0] for _ in range(24)))
             recall, precision, overlap = validate(average, validation)
             curve.writerow([f"{elapsed:.0f}", seen, f"{running or 0:.4f}", f"{recall:.4f}", f"{precision:.4f}", f"{overlap:.4f}"])
             print(f"{elapsed:.0f} s, {seen} samples, loss {running or 0:.3f}, points found {recall:.3f}, right {precision:.3f}, lines {overlap:.3f}", flush=True)
