@@ -63,6 +63,7 @@ class Frame:
         self.ball = None
         if ball is not None and ball.get("px") is not None:
             self.ball = (*ball["px"], ball["radius_px"], ball["visible_share"])
+        self.mistaken = []  # places (x, y) that the network took for the ball: windows are drawn about them
 
     def picture(self):
         return cv2.imdecode(np.frombuffer(self.file, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
@@ -87,9 +88,11 @@ def sample(frame, rng):
     stretch = np.exp(rng.normal(0.0, 0.05, 2))
     sx, sy = scale * stretch
     flip = rng.random() < 0.5
-    # Half of the windows are about the ball, some about a person, the rest anywhere.
+    # Half of the windows are about the ball or what was taken for it, some about a person, the rest anywhere.
     draw = rng.random()
-    if draw < 0.5 and frame.ball is not None and frame.ball[3] > 0:
+    if draw < 0.25 and frame.mistaken:
+        centre = np.array(frame.mistaken[rng.integers(len(frame.mistaken))]) + rng.uniform(-0.42, 0.42, 2) * [WIDTH / sx, HEIGHT / sy]
+    elif draw < 0.5 and frame.ball is not None and frame.ball[3] > 0:
         centre = np.array(frame.ball[:2]) + rng.uniform(-0.42, 0.42, 2) * [WIDTH / sx, HEIGHT / sy]
     elif draw < 0.75 and len(frame.boxes):
         box = frame.boxes[rng.integers(len(frame.boxes))]

@@ -111,6 +111,15 @@ def start_from_nanodet(network, path):
         last.weight[1 + len(ROLES) :], last.bias[1 + len(ROLES) :] = weight[80:], bias[80:]
 
 
+def start_from_exported(network, path):
+    """Goes on from the network that `export.py` wrote: its weights keep their names."""
+    import onnx
+    from onnx import numpy_helper
+
+    known = {tensor.name: torch.from_numpy(numpy_helper.to_array(tensor).copy()) for tensor in onnx.load(path).graph.initializer}
+    network.load_state_dict({name: known[f"network.{name}"] for name in network.state_dict()})
+
+
 def take(module, weight, bias):
     assert module.weight.shape == weight.shape, (module, weight.shape)
     module.weight.copy_(weight)

@@ -1,6 +1,7 @@
 """Trains the people network on rendered pictures, logs the curve, keeps the running average of the weights.
 
-    python3 train.py --data ../../target/datasets/people/train --validation ../../target/datasets/people/validation --out RUN --minutes 100
+    python3 train.py --nanodet nanodet_g_416.onnx --data ../../target/datasets/people/train \
+        --validation ../../target/datasets/people/validation --out RUN --minutes 100
 """
 
 import json
@@ -17,7 +18,7 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this fold
 
 from common import average_in, batches, begin, curve_of, parser_of, rate_at, with_average
 from dataset import Frames, sample, targets, whole
-from network import BALL_STRIDE, BINS, ROLES, STRIDE, PeopleNetwork, distances, start_from_nanodet
+from network import BALL_STRIDE, BINS, ROLES, STRIDE, PeopleNetwork, distances, start_from_exported, start_from_nanodet
 
 BATCH = 6
 WEIGHT_DECAY = 0.01
@@ -25,6 +26,7 @@ AVERAGE = 0.998
 ROLE_WEIGHTS = (1.0, 3.0, 2.0, 2.0)
 SCORE_MIN, BALL_SCORE_MIN = 0.4, 0.3  # from which something counts as found in validation
 SAME_IOU = 0.55
+MISTAKEN_MIN = 0.1  # score from which a place that is not the ball was taken for it
 
 
 def stack(samples):
@@ -153,9 +155,26 @@ def validate(network, samples):
     return share(right, people), share(right, found), share(roles_right, right), share(ball_right, balls), share(ball_right, ball_found)
 
 
+@torch.no_grad()
+def mine(network, frames):
+    """Notes in every frame what the network takes for the ball there, and is not; gives how many such places there are."""
+    network.eval()
+    for frame in frames:
+        shown = whole(frame)
+        candidates = decode(*network(stack([shown])))[3]
+        wrong = candidates[candidates[:, 3] >= MISTAKEN_MIN].tolist()
+        if frame.ball is not None:
+            x, y, radius, _ = frame.ball
+            wrong = [c for c in wrong if np.hypot(c[0] - x, c[1] - y) > max(4 * radius, 8.0)]
+        frame.mistaken = [(c[0], c[1]) for c in wrong]
+    network.train()
+    return sum(len(frame.mistaken) for frame in frames)
+
+
 def main():
     parser = parser_of(__doc__, minutes=100.0, rate=8e-4)
     parser.add_argument("--nanodet", help="NanoDet-g as ONNX, to start from without a checkpoint (see README.md)")
+    parser.add_argument("--exported", help="people.onnx, to go on from; what it takes for the ball in the pictures and is not is shown more often")
     parser.add_argument("--backbone", type=float, default=0.25, help="share of the learning rate for NanoDet's layers")
     parser.add_argument("--pictures", type=int, default=48, help="pictures to watch the curve on")
     arguments = parser.parse_args()
@@ -166,7 +185,10 @@ def main():
     watched = [whole(frame) for frame in watched.frames[:: max(len(watched) // arguments.pictures, 1)]]
     print(f"{len(data)} pictures to train on, {len(watched)} to watch the curve", flush=True)
     network = PeopleNetwork()
-    if not arguments.start:
+    if arguments.exported:
+        start_from_exported(network, arguments.exported)
+        print(f"{mine(network, data.frames)} places taken for the ball", flush=True)
+    elif not arguments.start:
         start_from_nanodet(network, arguments.nanodet)
     network, average = with_average(network, arguments.start)
     backbone = {id(p) for p in network.backbone()}
@@ -187,7 +209,7 @@ def main():
             reported = elapsed
             figures = validate(average, watched)
             curve.writerow([f"{elapsed:.0f}", seen, *(f"{value:.4f}" for value in [*(running or (0, 0)), *figures])])
-            print(f"{elapsed:.0f} s, {seen} samples, losses {running[0]:.3f} {running[1]:.3f}, people found {figures[0]:.3f} right {figures[1]:.3f} role {figures[2]:.3f}, ball found {figures[3]:.3f} right {figures[4]:.3f}", flush=True)
+            print(f"{elapsed:.0f} s, {seen} samples, people found {figures[0]:.3f} right {figures[1]:.3f} role {figures[2]:.3f}, ball found {figures[3]:.3f} right {figures[4]:.3f}", flush=True)
             torch.save(average.state_dict(), out / "average.pt")
             torch.save(network.state_dict(), out / "network.pt")
         if part >= 1.0:

@@ -6,8 +6,6 @@
 
 mod parabola;
 
-use std::collections::BTreeMap;
-
 use glam::{DVec2, DVec3};
 use protocol::camera::Camera;
 
@@ -15,9 +13,12 @@ use crate::{
     calibration::CameraEstimate,
     ingest::ClipInfo,
     pose::{Person, index, lift_upright},
-    tracking::Track,
+    tracking::{Sighting, Track},
 };
 use parabola::{Jump, Sample};
+
+/// The camera of a shot moves less than this from frame to frame, metres.
+const SAME_CAMERA_M: f64 = 1.0;
 
 /// A sighting off the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,31 +45,26 @@ pub fn find(
 ) -> Vec<Lift> {
     let mut lifts = Vec::new();
     for track in tracks {
-        let mut places = BTreeMap::new();
-        let mut samples = Vec::new();
-        for sighting in &track.sightings {
-            let camera = cameras.get(sighting.frame).and_then(|estimate| estimate.camera);
-            let person = people.get(sighting.frame).and_then(|frame| frame.get(sighting.person_index));
-            let time = clip.frames.get(sighting.frame);
-            if let (Some(camera), Some(person), Some(time)) = (camera, person, time)
-                && let Some(sample) = sample(&camera, person, clip.timescale.seconds(time.start))
-            {
-                places.insert(samples.len(), (*sighting, camera));
-                samples.push(sample);
-            }
-        }
-        for jump in parabola::jumps(&samples) {
-            for (number, sample) in samples.iter().enumerate() {
-                let above_ground_m = jump.height_m(sample.seconds);
-                let Some((sighting, camera)) = places.get(&number) else { continue };
-                if above_ground_m > 0.0 {
-                    lifts.push(Lift {
+        let seen = track.sightings.iter().filter_map(|sighting| {
+            let camera = cameras.get(sighting.frame)?.camera?;
+            let person = people.get(sighting.frame)?.get(sighting.person_index)?;
+            let time = clip.frames.get(sighting.frame)?;
+            Some((*sighting, camera, sample(&camera, person, clip.timescale.seconds(time.start))?))
+        });
+        let seen: Vec<(Sighting, Camera, Sample)> = seen.collect();
+        // From another place the distance is another one: a cut would look like a leap.
+        for shot in seen.chunk_by(|(_, a, _), (_, b, _)| a.position.distance(b.position) < SAME_CAMERA_M) {
+            let samples: Vec<Sample> = shot.iter().map(|(_, _, sample)| *sample).collect();
+            for jump in parabola::jumps(&samples) {
+                lifts.extend(shot.iter().filter_map(|(sighting, camera, sample)| {
+                    let above_ground_m = jump.height_m(sample.seconds);
+                    (above_ground_m > 0.0).then(|| Lift {
                         frame: sighting.frame,
                         person_index: sighting.person_index,
                         above_ground_m,
                         ground_m: under(camera, sample, &jump),
-                    });
-                }
+                    })
+                }));
             }
         }
     }

@@ -16,8 +16,8 @@ const BESIDE_SIGHTINGS: usize = 4;
 /// Least share of the air time's frames with a sighting.
 const SEEN: f64 = 0.5;
 /// Strengths that a jump may have by the feet (which may be drawn up) and by the hips (which rise before the feet do).
-const BY_FEET: std::ops::RangeInclusive<f64> = 0.6..=1.7;
-const BY_HIPS: std::ops::RangeInclusive<f64> = 0.4..=1.8;
+const BY_FEET: std::ops::RangeInclusive<f64> = 0.75..=1.7;
+const BY_HIPS: std::ops::RangeInclusive<f64> = 0.6..=1.8;
 /// Least strengths in standard deviations.
 const SURE_BY_FEET: f64 = 5.0;
 const SURE_BY_HIPS: f64 = 3.0;

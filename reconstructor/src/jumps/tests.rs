@@ -54,12 +54,23 @@ fn found(
     at: impl Fn(f64) -> DVec3,
     above_m: impl Fn(f64) -> f64,
 ) -> (Vec<Lift>, Vec<Vec<Person>>, Vec<CameraEstimate>) {
-    let camera = camera();
+    found_by(frames, |_| camera(), at, above_m)
+}
+
+/// The same with the camera of every frame.
+fn found_by(
+    frames: usize,
+    camera: impl Fn(usize) -> Camera,
+    at: impl Fn(f64) -> DVec3,
+    above_m: impl Fn(f64) -> f64,
+) -> (Vec<Lift>, Vec<Vec<Person>>, Vec<CameraEstimate>) {
     let seconds = |k: usize| k as f64 / 25.0;
     let people: Vec<Vec<Person>> = (0..frames)
-        .map(|k| person(&camera, at(seconds(k)), above_m(seconds(k)), k).into_iter().collect())
+        .map(|k| person(&camera(k), at(seconds(k)), above_m(seconds(k)), k).into_iter().collect())
         .collect();
-    let cameras = vec![CameraEstimate { camera: Some(camera), ..CameraEstimate::default() }; frames];
+    let cameras: Vec<CameraEstimate> = (0..frames)
+        .map(|k| CameraEstimate { camera: Some(camera(k)), ..CameraEstimate::default() })
+        .collect();
     let time = |k: usize| FrameTime {
         clip_frame: k as u32,
         start: Ticks(k as i64),
@@ -140,6 +151,19 @@ fn feet_that_are_read_too_high_are_no_jump_when_the_hips_stay() {
     let sightings = (0..80).map(|frame| Sighting { frame, person_index: 0 }).collect();
     let tracks = [Track { person: PersonId(1), sightings }];
     assert_eq!(find(&people, &tracks, &cameras, &clip), []);
+}
+
+#[test]
+fn a_cut_is_no_jump() {
+    // For some frames the pictures come from 3 to 9 m farther back: the runner seems to leap away and back.
+    for behind_m in [3.0, 5.0, 9.0] {
+        let back = DVec3::new(0.0, 17.0, 72.0 + behind_m);
+        let farther = Camera::looking_at((1280, 720), 2300.0, back, DVec3::new(4.0, 0.0, 0.0));
+        for air in [10, 13, 16] {
+            let by = |k: usize| if (30..30 + air).contains(&k) { farther } else { camera() };
+            assert_eq!(found_by(80, by, run, |_| 0.0).0, [], "{behind_m} m, {air} frames");
+        }
+    }
 }
 
 #[test]

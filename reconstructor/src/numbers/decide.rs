@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::manifest::PersonId;
 
-use super::{Reading, TENS, UNITS};
+use super::{
+    Reading,
+    evidence::{NumberEvidence, ShirtNumber},
+};
 use crate::{
     teams::{Member, Role, Team},
     tracking::{Sighting, Track},
@@ -13,28 +16,10 @@ use crate::{
 /// What was read in which sighting.
 pub type Readings = BTreeMap<Sighting, Reading>;
 
-/// Numbers run from 1 to this.
-const NUMBERS: usize = 99;
 /// From this confidence on a number is given out. Chosen on rendered matches that the network was not trained on (`docs/tracking.md`).
 const GIVEN_FROM: f64 = 0.99;
-/// How alike looks at one person err: they share kit, lettering and light. Many looks count as 1 / ALIKE, however many there are.
-const ALIKE: f64 = 0.25;
-/// Most players of a match wear one of the first 30 numbers.
-const COMMON: usize = 30;
-const COMMON_WEIGHT: f64 = 3.0;
 /// Of two team-mates with one number the surer keeps it when its odds are so many times those of the other; else neither has it.
 const SURER: f64 = 5.0;
-/// No look rules a number out for good.
-const PROBABILITY_MIN: f64 = 1e-4;
-
-/// A shirt number, and how sure it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShirtNumber {
-    /// 1 to 99.
-    pub number: u8,
-    /// Probability that it is right, 0..1.
-    pub confidence: f64,
-}
 
 /// A number that somebody may have.
 struct Claim<'a> {
@@ -57,7 +42,7 @@ pub fn decide(tracks: &[Track], members: &[Member], readings: &Readings) -> BTre
         }
         let looks: Vec<&Reading> =
             track.sightings.iter().filter_map(|sighting| readings.get(sighting)).collect();
-        let Some(read) = likeliest(&looks) else { continue };
+        let Some(read) = NumberEvidence::of(&looks).likeliest() else { continue };
         tracing::debug!(
             "person {}: {} with {:.4} after {} looks",
             track.person.0,
@@ -82,30 +67,6 @@ pub fn decide(tracks: &[Track], members: &[Member], readings: &Readings) -> BTre
     given.map(|claim| (claim.track.person, claim.number)).collect()
 }
 
-/// The number that explains all looks best, and its probability; `None` without looks.
-fn likeliest(looks: &[&Reading]) -> Option<ShirtNumber> {
-    // Looks that show no number do not make the others count less.
-    let legible: f64 = looks.iter().map(|look| f64::from(look.legible)).sum();
-    let weight = 1.0 / (1.0 + ALIKE * (legible - 1.0).max(0.0));
-    let evidence: Vec<f64> = (1..=NUMBERS)
-        .map(|number| {
-            let prior = if number <= COMMON { COMMON_WEIGHT.ln() } else { 0.0 };
-            prior + weight * looks.iter().map(|look| likelihood(look, number).ln()).sum::<f64>()
-        })
-        .collect();
-    let (place, most) = evidence.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let all: f64 = evidence.iter().map(|value| (value - most).exp()).sum();
-    (!looks.is_empty()).then(|| ShirtNumber { number: place as u8 + 1, confidence: 1.0 / all })
-}
-
-/// How much likelier a look is with this number on the back than with any other. A look that may show no number says little.
-fn likelihood(look: &Reading, number: usize) -> f64 {
-    let of = |digits: &[f32], digit: usize| f64::from(digits.get(digit).copied().unwrap_or(0.0));
-    let both = of(&look.tens, number / 10) * of(&look.units, number % 10) * (TENS * UNITS) as f64;
-    let legible = f64::from(look.legible);
-    (legible * both + 1.0 - legible).max(PROBABILITY_MIN)
-}
-
 impl Claim<'_> {
     fn odds(&self) -> f64 {
         self.number.confidence / (1.0 - self.number.confidence).max(1e-12)
@@ -128,17 +89,7 @@ fn together(a: &Track, b: &Track) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
-    /// A look at a number of which the network is so sure, digit by digit.
-    fn look(number: usize, sure: f32, legible: f32) -> Reading {
-        let peak = |digit: usize| {
-            let mut ten = [(1.0 - sure) / 9.0; 10];
-            ten[digit] = sure;
-            ten
-        };
-        Reading { tens: peak(number / 10), units: peak(number % 10), legible }
-    }
+    use super::{super::evidence::tests::look, *};
 
     fn track(person: u32, frames: std::ops::Range<usize>) -> Track {
         let sightings = frames.map(|frame| Sighting { frame, person_index: person as usize });
@@ -163,31 +114,6 @@ mod tests {
             .iter()
             .flat_map(|(track, look)| track.sightings.iter().map(move |sighting| (*sighting, look.clone())));
         all.collect()
-    }
-
-    #[test]
-    fn several_fair_looks_agree_on_a_number_and_one_is_not_enough() {
-        let fair = look(17, 0.8, 0.9);
-        let one = likeliest(&[&fair]).unwrap();
-        let six = likeliest(&[&fair; 6]).unwrap();
-        assert_eq!((one.number, six.number), (17, 17));
-        assert!(one.confidence < GIVEN_FROM && six.confidence > GIVEN_FROM, "{one:?} {six:?}");
-        assert_eq!(likeliest(&[]), None);
-    }
-
-    #[test]
-    fn looks_that_contradict_each_other_or_show_nothing_give_no_number() {
-        let (a, b) = (look(6, 0.9, 0.9), look(8, 0.9, 0.9));
-        let torn = likeliest(&[&a, &b, &a, &b]).unwrap();
-        assert!(torn.confidence < 0.6, "{torn:?}");
-        let nothing = look(10, 1.0, 0.02);
-        let seen = likeliest(&[&nothing; 4]).unwrap();
-        assert!(seen.confidence < GIVEN_FROM, "{seen:?}");
-        // One wild look does not undo ten good ones.
-        let good = look(23, 0.9, 0.95);
-        let wild = look(7, 1.0, 1.0);
-        let mixed = likeliest(&[[&good; 10].as_slice(), &[&wild]].concat()).unwrap();
-        assert!(mixed.number == 23 && mixed.confidence > GIVEN_FROM, "{mixed:?}");
     }
 
     #[test]

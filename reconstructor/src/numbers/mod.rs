@@ -1,10 +1,11 @@
 //! Shirt numbers: a small network of our own looks at the backs that are turned to the camera, and what it saw in many looks becomes one
 //! number per person, or none. A wrong number is worse than none.
 //!
-//! [`due`] says who is looked at in which frame, [`NumberReader`] looks, [`decide`] weighs all looks of a track and sees to it that no two
-//! players of a team carry one number at a time.
+//! [`due`] says who is looked at in which frame, [`NumberReader`] looks, [`evidence`] weighs all looks of a track, and [`decide`] sees to it that
+//! no two players of a team carry one number at a time.
 
 mod decide;
+pub(crate) mod evidence;
 mod patch;
 #[cfg(test)]
 mod tests;
@@ -14,7 +15,8 @@ use std::collections::BTreeMap;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-pub use decide::{Readings, ShirtNumber, decide};
+pub use decide::{Readings, decide};
+pub use evidence::ShirtNumber;
 
 use crate::{
     inference::{InferenceError, Model, Tensor},

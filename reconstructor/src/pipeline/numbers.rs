@@ -16,13 +16,12 @@ use crate::{
 };
 
 impl Run<'_> {
-    /// The shirt numbers that can be read.
-    pub(super) fn numbers(
+    /// What looks at the backs of those who are followed show.
+    pub(super) fn read_backs(
         &mut self,
         people: &[Vec<Person>],
         tracks: &[Track],
-        members: &[Member],
-    ) -> Result<BTreeMap<PersonId, ShirtNumber>, PipelineError> {
+    ) -> Result<Readings, PipelineError> {
         let settings = format!("{:?}", self.options.tracking);
         let results = self.results(Stage::Numbers, numbers::MODEL, &[settings.as_bytes()])?;
         let due = numbers::due(people, tracks, self.clip.info());
@@ -44,19 +43,27 @@ impl Run<'_> {
                 Ok(looks)
             },
         )?;
-        let readings: Readings = looks
+        Ok(looks
             .into_iter()
             .enumerate()
             .flat_map(|(frame, looks)| looks.into_iter().flatten().map(move |look| (frame, look)))
             .map(|(frame, (person_index, reading))| (Sighting { frame, person_index }, reading))
-            .collect();
-        let read = numbers::decide(tracks, members, &readings);
-        tracing::info!(
-            "numbers: {} of {} people read in {} looks at backs",
-            read.len(),
-            tracks.len(),
-            readings.len()
-        );
-        Ok(read)
+            .collect())
     }
+}
+
+/// The shirt numbers that can be read.
+pub(super) fn numbers(
+    tracks: &[Track],
+    members: &[Member],
+    readings: &Readings,
+) -> BTreeMap<PersonId, ShirtNumber> {
+    let read = numbers::decide(tracks, members, readings);
+    tracing::info!(
+        "numbers: {} of {} people read in {} looks at backs",
+        read.len(),
+        tracks.len(),
+        readings.len()
+    );
+    read
 }

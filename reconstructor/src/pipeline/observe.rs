@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, ops::Range, path::PathBuf};
 
 use protocol::{manifest::PersonId, pitch::Pitch};
 
-use super::{PipelineError, run::Run};
+use super::{PipelineError, numbers::numbers, players::smooth_poses, run::Run};
 use crate::{
     ball::BallEstimate,
     calibration::CameraEstimate,
@@ -83,9 +83,12 @@ impl Run<'_> {
         let mut cameras = self.calibrate(&detections)?;
         let mut people = self.pose(&detections, &cameras)?;
         self.settle_sides(&mut people, &mut cameras);
-        let (tracks, members) = self.track(&people, &cameras)?;
-        self.smooth_poses(&mut people, &tracks, &cameras);
-        let numbers = self.numbers(&people, &tracks, &members)?;
+        let followed = self.follow(&people, &cameras)?;
+        let filled = smooth_poses(&mut people, &followed, &cameras);
+        let readings = self.read_backs(&people, &followed)?;
+        let (tracks, members) = self.identify(followed, &people, &cameras, &readings);
+        self.note_poses(&people, &tracks, &filled);
+        let numbers = numbers(&tracks, &members, &readings);
         let lifts = self.jumps(&mut people, &tracks, &cameras);
         let ball = self.ball(&balls, &cameras, &people);
         Ok(Seen { detections, cameras, people, tracks, members, numbers, ball, lifts })

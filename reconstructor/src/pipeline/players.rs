@@ -13,6 +13,7 @@ use crate::{
     calibration::CameraEstimate,
     depth::{self, DepthError, DepthEstimator, DepthMap},
     geometry::Mask,
+    numbers::Readings,
     pose::{POSE_SCORE_MIN, Person},
     report::{Failure, Loss, Stage},
     segmentation::{self, FrameSeen, PlayerMask, RefiningSegmenter, Segmenter},
@@ -23,6 +24,22 @@ use crate::{
 
 /// A depth map, or why there is none.
 pub(super) type PersonDepth = Result<DepthMap, String>;
+
+/// Smooths poses along the tracks of each shot; gives those that were made from the frames before and after.
+pub(super) fn smooth_poses(
+    people: &mut [Vec<Person>],
+    tracks: &[Track],
+    cameras: &[CameraEstimate],
+) -> BTreeSet<Sighting> {
+    let changes = trajectory::smooth_poses(people, tracks, cameras);
+    tracing::info!(
+        "poses: {} with left and right exchanged, {} made from those before and after, {} joints set right",
+        changes.exchanged,
+        changes.filled.len(),
+        changes.outliers
+    );
+    changes.filled.into_iter().collect()
+}
 
 /// The masks of a frame: whose, which of the frame's people, which pixels.
 pub(super) type FrameMasks<'a> = BTreeMap<PersonId, &'a PlayerMask>;
@@ -38,23 +55,16 @@ impl Run<'_> {
         }
     }
 
-    /// Who is who, and on whose side.
-    pub(super) fn track(
+    /// Who is who within each shot.
+    pub(super) fn follow(
         &mut self,
         people: &[Vec<Person>],
         cameras: &[CameraEstimate],
-    ) -> Result<(Vec<Track>, Vec<Member>), PipelineError> {
+    ) -> Result<Vec<Track>, PipelineError> {
         let started = Instant::now();
         let (info, limits) = (self.clip.info(), &self.options.tracking);
         let tracks = tracking::track_shots(people, cameras, info, &self.shots, limits);
         let tracks = teams::on_the_pitch(tracks, people, &self.pitch);
-        let (tracks, members) = if limits.over_cuts {
-            let clip = Clip { people, cameras, info, shots: &self.shots };
-            teams::join_tracks(&tracks, &clip, &self.pitch)
-        } else {
-            let members = teams::assign(&tracks, people, &self.pitch);
-            (tracks, members)
-        };
         self.reporter.stage_done(Stage::Tracking, started.elapsed(), 0);
         if tracks.is_empty() {
             return Err(PipelineError::Nobody {
@@ -63,24 +73,33 @@ impl Run<'_> {
                 seen: people.iter().map(Vec::len).sum(),
             });
         }
-        Ok((tracks, members))
+        Ok(tracks)
     }
 
-    /// Smooths poses along the tracks. Who has no pose of its own is noted: mended from the frames around, or left standing.
-    pub(super) fn smooth_poses(
-        &mut self,
-        people: &mut [Vec<Person>],
-        tracks: &[Track],
+    /// Who is who over the whole clip, and on whose side.
+    pub(super) fn identify(
+        &self,
+        tracks: Vec<Track>,
+        people: &[Vec<Person>],
         cameras: &[CameraEstimate],
+        readings: &Readings,
+    ) -> (Vec<Track>, Vec<Member>) {
+        if self.options.tracking.over_cuts {
+            let clip = Clip { people, cameras, info: self.clip.info(), shots: &self.shots };
+            teams::join_tracks(&tracks, &clip, &self.pitch, readings)
+        } else {
+            let members = teams::assign(&tracks, people, &self.pitch);
+            (tracks, members)
+        }
+    }
+
+    /// Notes who has no pose of their own: it was made from the frames around, or they are left standing.
+    pub(super) fn note_poses(
+        &mut self,
+        people: &[Vec<Person>],
+        tracks: &[Track],
+        filled: &BTreeSet<Sighting>,
     ) {
-        let changes = trajectory::smooth_poses(people, tracks, cameras);
-        tracing::info!(
-            "poses: {} with left and right exchanged, {} made from those before and after, {} joints set right",
-            changes.exchanged,
-            changes.filled.len(),
-            changes.outliers
-        );
-        let filled: BTreeSet<Sighting> = changes.filled.into_iter().collect();
         for track in tracks {
             for sighting in &track.sightings {
                 let person = people.get(sighting.frame).and_then(|frame| frame.get(sighting.person_index));

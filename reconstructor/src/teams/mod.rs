@@ -17,10 +17,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     detection::RoleChances,
+    numbers::{Readings, evidence::NumberEvidence},
     pose::{Looks, Person},
     tracking::{
-        Track,
-        across::{self, Clip},
+        Sighting, Track,
+        across::{self, Clip, Marks},
         appearance::MeanLooks,
     },
 };
@@ -131,9 +132,14 @@ pub fn assign(tracks: &[Track], people: &[Vec<Person>], pitch: &Pitch) -> Vec<Me
     .collect()
 }
 
-/// Joins tracks of one person over cuts and spells out of the picture, with the help of who is on whose side, and says who everybody
-/// is then.
-pub(crate) fn join_tracks(tracks: &[Track], clip: &Clip<'_>, pitch: &Pitch) -> (Vec<Track>, Vec<Member>) {
+/// Joins tracks of one person over cuts and spells out of the picture, with the help of who is on whose side and of shirt numbers, and says
+/// who everybody is then.
+pub(crate) fn join_tracks(
+    tracks: &[Track],
+    clip: &Clip<'_>,
+    pitch: &Pitch,
+    readings: &Readings,
+) -> (Vec<Track>, Vec<Member>) {
     let members = assign(tracks, clip.people, pitch);
     let side = |person: PersonId| {
         let member = members.iter().find(|member| member.person == person)?;
@@ -141,7 +147,11 @@ pub(crate) fn join_tracks(tracks: &[Track], clip: &Clip<'_>, pitch: &Pitch) -> (
         let team = member.team.filter(|_| member.team_confidence > SURE);
         Some(role as u8 * 3 + team.map_or(0, |team| team as u8 + 1))
     };
-    let joined = across::join_tracks(tracks, clip, &side);
+    let number = |sightings: &mut dyn Iterator<Item = Sighting>| {
+        let looks: Vec<_> = sightings.filter_map(|sighting| readings.get(&sighting)).collect();
+        NumberEvidence::of(&looks)
+    };
+    let joined = across::join_tracks(tracks, clip, &Marks { side: &side, number: &number });
     let members = assign(&joined, clip.people, pitch);
     (joined, members)
 }

@@ -1,5 +1,5 @@
-//! Identities over cuts and out of the picture: tracks of a clip are joined where places, kits and the people left over make it sure, and are
-//! honestly new where not.
+//! Identities over cuts and out of the picture: tracks of a clip are joined where places, kits, shirt numbers and the people left over make it
+//! sure, and are honestly new where not.
 //!
 //! Live pictures follow each other without a gap, so whoever stood somewhere before a cut stands there after it. A replay shows another moment: its
 //! people do not stand where those before it stood, and none of them is joined.
@@ -15,7 +15,10 @@ use super::{
     motion::Place,
     tracklets::{Seen, Tracklet},
 };
-use crate::{calibration::CameraEstimate, ingest::ClipInfo, pose::Person, shots::ShotList};
+use crate::{
+    calibration::CameraEstimate, ingest::ClipInfo, numbers::evidence::NumberEvidence, pose::Person,
+    shots::ShotList,
+};
 
 /// Rounds, from what is nearly certain to what is only unambiguous: longest gap in seconds, and by how much a link must be clear.
 const ROUNDS: [(f64, f64); 5] = [(AT_CUT_S, 3.0), (1.0, 2.0), (3.0, 1.5), (8.0, 1.5), (20.0, 1.5)];
@@ -44,15 +47,19 @@ pub(crate) struct Clip<'a> {
     pub(crate) shots: &'a ShotList,
 }
 
-/// Joins tracks of the same person. `side` says team and role of a track as a number, where known. The result is numbered anew, in order of first
-/// sighting.
-pub(crate) fn join_tracks(
-    tracks: &[Track],
-    clip: &Clip<'_>,
-    side: &dyn Fn(PersonId) -> Option<u8>,
-) -> Vec<Track> {
+/// What is known of tracks besides places and looks.
+#[derive(Clone, Copy)]
+pub(crate) struct Marks<'a> {
+    /// Team and role of a track as a number, where known.
+    pub(crate) side: &'a dyn Fn(PersonId) -> Option<u8>,
+    /// What looks at the backs in these sightings say.
+    pub(crate) number: &'a dyn Fn(&mut dyn Iterator<Item = Sighting>) -> NumberEvidence,
+}
+
+/// Joins tracks of the same person. The result is numbered anew, in order of first sighting.
+pub(crate) fn join_tracks(tracks: &[Track], clip: &Clip<'_>, marks: &Marks<'_>) -> Vec<Track> {
     let mut runs: Vec<Tracklet> = tracks.iter().map(|track| clip.seen(&track.sightings)).collect();
-    let mut sides: Vec<Option<u8>> = tracks.iter().map(|track| side(track.person)).collect();
+    let mut sides: Vec<Option<u8>> = tracks.iter().map(|track| (marks.side)(track.person)).collect();
     let whole: Vec<bool> = runs.iter().zip(tracks).map(|(run, t)| run.len() == t.sightings.len()).collect();
     let mut broken: BTreeSet<usize> = BTreeSet::new();
     for (round, (gap_s, clear_by)) in ROUNDS.into_iter().enumerate() {
@@ -62,6 +69,8 @@ pub(crate) fn join_tracks(
         let nodes: Vec<(usize, Node)> =
             runs.iter().enumerate().filter_map(|(i, run)| Some((i, Node::of(run)?))).collect();
         let (places, nodes): (Vec<usize>, Vec<Node>) = nodes.into_iter().unzip();
+        let numbers: Vec<NumberEvidence> =
+            runs.iter().map(|run| (marks.number)(&mut run.iter().map(|seen| seen.sighting))).collect();
         let at = |node: usize| places.get(node).copied().unwrap_or(usize::MAX);
         let extra = |from: usize, to: usize| {
             let (a, b) = (runs.get(at(from))?, runs.get(at(to))?);
@@ -72,7 +81,8 @@ pub(crate) fn join_tracks(
                 (Some(a), Some(b)) if a != b => OTHER_SIDE,
                 _ => 0.0,
             };
-            Some(-other_side - UNSEEN_PER_S * clip.unseen_s(a.last()?, b.first()?))
+            let number = numbers.get(at(from))?.log_same(numbers.get(at(to))?);
+            Some(number - other_side - UNSEEN_PER_S * clip.unseen_s(a.last()?, b.first()?))
         };
         let mut found: Vec<(usize, usize)> =
             links(&nodes, &round_of, &extra).into_iter().map(|(from, to)| (at(from), at(to))).collect();

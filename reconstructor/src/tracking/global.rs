@@ -22,6 +22,8 @@ const UNSEEN_PER_S: f64 = 0.8;
 const TWICE_M: f64 = 0.8;
 const TWICE_OVERLAP: f64 = 0.5;
 const TWICE_SHARE: f64 = 0.6;
+/// Somebody who is seen twice may change from one track to another within this time, seconds.
+const HANDOVER_S: f64 = 0.5;
 
 /// Who is who within one shot; every list by frame.
 pub(super) fn chains(
@@ -64,8 +66,43 @@ pub(super) fn chains(
             runs.retain(|run| !run.is_empty());
         }
     }
-    let runs = without_doubles(runs, people);
+    let runs = without_doubles(hand_over(runs, people), people);
     runs.into_iter().map(|run| run.into_iter().map(|seen| seen.sighting).collect()).collect()
+}
+
+/// Joins tracks of which one begins just before the other ends, where both are sightings of one person in every frame that they share.
+fn hand_over(mut runs: Vec<Tracklet>, people: &[Vec<Person>]) -> Vec<Tracklet> {
+    runs.sort_by_key(|run| run.first().map(|seen| seen.sighting));
+    let mut kept: Vec<Tracklet> = Vec::new();
+    for run in runs {
+        let before = kept.iter_mut().filter_map(|earlier| Some((shared(earlier, &run, people)?, earlier)));
+        match before.min_by_key(|(shared, _)| *shared) {
+            Some((shared, earlier)) => earlier.extend(run.into_iter().skip(shared)),
+            None => kept.push(run),
+        }
+    }
+    kept
+}
+
+/// How many sightings at the start of `later` are second ones of whom `earlier` shows at its end; `None` when it does not go on from there.
+fn shared(earlier: &[Seen], later: &[Seen], people: &[Vec<Person>]) -> Option<usize> {
+    let (end, start) = (earlier.last()?, later.first()?);
+    let goes_on = earlier.first()?.sighting.frame < start.sighting.frame
+        && later.last()?.sighting.frame > end.sighting.frame;
+    if !goes_on || !(0.0..=HANDOVER_S).contains(&(end.seconds - start.seconds)) {
+        return None;
+    }
+    let tail = earlier.iter().rev().take_while(|seen| seen.sighting.frame >= start.sighting.frame);
+    let mut pairs = 0;
+    for seen in tail {
+        if let Some(other) = later.iter().find(|other| other.sighting.frame == seen.sighting.frame) {
+            if !coincide(people, seen.sighting, other.sighting) {
+                return None;
+            }
+            pairs += 1;
+        }
+    }
+    (pairs > 0).then(|| later.partition_point(|seen| seen.sighting.frame <= end.sighting.frame))
 }
 
 /// Leaves out tracks that are a second sighting of somebody for most of their time.
