@@ -16,7 +16,7 @@ mod segments;
 mod sight;
 
 use glam::DVec3;
-use protocol::pitch::Pitch;
+use protocol::{camera::Camera, pitch::Pitch};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -60,6 +60,12 @@ pub enum BallState {
     Flight,
     /// In somebody's hands.
     Held,
+}
+
+/// How likely a candidate is the ball, 0..1, by its score, its size and where it is seen; in one picture alone.
+#[must_use]
+pub fn likely(camera: &Camera, candidate: &BallCandidate, pitch: &Pitch) -> f64 {
+    path::likely(camera, candidate, pitch)
 }
 
 /// The ball in every frame of `clip`, `None` where it is not known.

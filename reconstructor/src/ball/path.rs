@@ -198,18 +198,8 @@ fn node(
     let pixel = candidate.centre_px;
     let scale_px = sight::scale_px(camera, pixel);
     let score = f64::from(candidate.score).clamp(0.02, 0.98);
-    let mut reward = REWARD + SCORE_WEIGHT * (score / (1.0 - score)).ln();
-    // A ball in the air is nearer than the grass it is seen against, so it may be larger, not much smaller.
-    let size = (candidate.diameter_px.max(0.5) / (2.0 * RADIUS_M * scale_px).max(1.0)).ln();
-    let surprise = if size > 0.0 { (size - 0.15).max(0.0) } else { size };
-    reward -= (surprise / SIZE_SIGMA).powi(2).min(9.0) / 2.0;
-    let place = sight::on_grass(camera, pixel).map(|point| DVec2::new(point.x, point.z));
-    if !place.is_some_and(|place| pitch.contains(place, OUTSIDE_M)) {
-        reward -= OUTSIDE_COST;
-    }
-    if place.is_some_and(|place| spots.iter().any(|spot| spot.distance(place) < PAINT_M)) {
-        reward -= PAINT_COST;
-    }
+    let reward =
+        REWARD + SCORE_WEIGHT * (score / (1.0 - score)).ln() - misfit(camera, candidate, pitch, spots);
     let near = bodies::near(camera, people, pixel, TOUCH_M);
     let turn_cost = if near.is_empty() { OPEN_COST } else { TOUCH_COST };
     Node {
@@ -220,6 +210,31 @@ fn node(
         focal_px: camera.focal_px,
         turn_cost,
     }
+}
+
+/// What speaks against a candidate in its picture alone, as a loss of logarithmic odds: size and place.
+fn misfit(camera: &Camera, candidate: &BallCandidate, pitch: &Pitch, spots: &[DVec2]) -> f64 {
+    let pixel = candidate.centre_px;
+    // A ball in the air is nearer than the grass it is seen against, so it may be larger, not much smaller.
+    let ball_px = (2.0 * RADIUS_M * sight::scale_px(camera, pixel)).max(1.0);
+    let size = (candidate.diameter_px.max(0.5) / ball_px).ln();
+    let surprise = if size > 0.0 { (size - 0.15).max(0.0) } else { size };
+    let mut cost = (surprise / SIZE_SIGMA).powi(2).min(9.0) / 2.0;
+    let place = sight::on_grass(camera, pixel).map(|point| DVec2::new(point.x, point.z));
+    if !place.is_some_and(|place| pitch.contains(place, OUTSIDE_M)) {
+        cost += OUTSIDE_COST;
+    }
+    if place.is_some_and(|place| spots.iter().any(|spot| spot.distance(place) < PAINT_M)) {
+        cost += PAINT_COST;
+    }
+    cost
+}
+
+/// How likely a candidate is the ball, 0..1, by its score, size and place in one picture.
+pub(super) fn likely(camera: &Camera, candidate: &BallCandidate, pitch: &Pitch) -> f64 {
+    let score = f64::from(candidate.score).clamp(0.0, 1.0);
+    let against = misfit(camera, candidate, pitch, &painted_spots(pitch)).exp();
+    score / (score + (1.0 - score) * against)
 }
 
 /// Penalty marks, the centre mark and corners of painted lines: small, white and always there.

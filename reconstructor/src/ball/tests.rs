@@ -214,3 +214,21 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_candidate_of_the_wrong_size_or_beyond_the_pitch_is_less_likely_the_ball() {
+    let (camera, pitch) = (camera(0), Pitch::default());
+    let at = |place: DVec3, size: f64| {
+        let diameter_px = 2.0 * RADIUS_M * camera.pixels_per_metre(place) * size;
+        let centre_px = camera.project(place).unwrap();
+        likely(&camera, &BallCandidate { centre_px, diameter_px, score: 0.6 }, &pitch)
+    };
+    let place = DVec3::new(-4.0, RADIUS_M, 3.0);
+    assert!((at(place, 1.0) - 0.6).abs() < 1e-3, "nothing speaks against it: {}", at(place, 1.0));
+    assert!(at(place, 3.0) < 0.3 && at(place, 0.3) < 0.3);
+    // In the air it is seen before grass that is farther away.
+    assert!(at(place, 1.15) > 0.59);
+    assert!(at(DVec3::new(-4.0, RADIUS_M, -50.0), 1.0) < 0.4);
+    // The centre mark.
+    assert!(at(DVec3::new(0.0, RADIUS_M, 0.0), 1.0) < 0.2);
+}

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::labelled::{self, LabelError, LabelledPicture};
 use crate::{
+    ball,
     calibration::{self, FindCamera},
     detection::{BALL_SURE, BallCandidate, DetectionError, Detector, Found as Shown},
     geometry::PixelBox,
@@ -165,15 +166,15 @@ fn is_on(pitch: &Pitch, person: &Person) -> bool {
     pitch.contains(DVec2::new(person.ground_m.x, person.ground_m.z), 0.0)
 }
 
-/// The best candidate that the camera sees before the pitch: white things in the stands and beside the pitch are many.
+/// The likeliest candidate that the camera sees before the pitch: white things in the stands and beside the pitch are many.
 fn ball(candidates: &[BallCandidate], camera: Option<&Camera>, pitch: &Pitch) -> Option<(DVec2, f64)> {
-    let before_pitch = |candidate: &&BallCandidate| {
-        camera.is_none_or(|camera| {
-            let ground = camera.ground_point(candidate.centre_px);
-            ground.is_some_and(|ground| pitch.contains(DVec2::new(ground.x, ground.z), BALL_MARGIN_M))
-        })
-    };
-    candidates.iter().find(before_pitch).map(|ball| (ball.centre_px, f64::from(ball.score)))
+    let likely = candidates.iter().filter_map(|candidate| {
+        let Some(camera) = camera else { return Some((candidate.centre_px, f64::from(candidate.score))) };
+        let ground = camera.ground_point(candidate.centre_px)?;
+        let before_pitch = pitch.contains(DVec2::new(ground.x, ground.z), BALL_MARGIN_M);
+        before_pitch.then(|| (candidate.centre_px, ball::likely(camera, candidate, pitch)))
+    });
+    likely.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 fn figures(pictures: &[LabelledPicture], found: &[Found]) -> DetectionFigures {

@@ -5,6 +5,7 @@
 //! (`pose_score` 0), and goes when it is not. Skeletons that coincide are one person.
 
 mod blazepose;
+mod erase;
 mod ground;
 mod looks;
 mod refine;
@@ -156,6 +157,11 @@ impl Person {
     }
 }
 
+/// Somebody whose box overlaps by more with that of a found person may have been read as that one.
+const TANGLED_IOU: f64 = 0.15;
+/// Where others were erased, a pose is believed from this score on: what is left of them can look like a body.
+const SURE_ALONE: f32 = 0.6;
+
 /// Joints and mask in one box of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
@@ -230,7 +236,19 @@ impl PoseEstimator {
             let mut seen = self.look_again(picture, square, &detection.bounds, clear)?;
             refine::refine(&mut self.refiner, &mut seen.joints)?;
             let fresh = |person: &Person| !people.iter().any(|other| same_person(other, person, camera));
-            let posed = person_from(&seen, detection, camera, pitch).filter(fresh);
+            let mut posed = person_from(&seen, detection, camera, pitch).filter(fresh);
+            if posed.is_none() && detection.score >= CLEAR {
+                let rivals =
+                    || people.iter().filter(|other| other.bounds.iou(&detection.bounds) > TANGLED_IOU);
+                if rivals().next().is_some() {
+                    let without = erase::without(picture, rivals().map(|other| &other.mask), square);
+                    let mut alone = blazepose::estimate(&mut self.model, &without, square)?;
+                    refine::refine(&mut self.refiner, &mut alone.joints)?;
+                    let sure = alone.score >= SURE_ALONE;
+                    posed =
+                        sure.then(|| person_from(&alone, detection, camera, pitch)).flatten().filter(fresh);
+                }
+            }
             let unposed = || clear.then(|| standing::in_box(&seen, detection, camera, pitch)).flatten();
             match posed.or_else(unposed) {
                 Some(person) => people.push(person),

@@ -140,3 +140,63 @@ fn coincide(people: &[Vec<Person>], a: Sighting, b: Sighting) -> bool {
     let (Some(a), Some(b)) = (person(a), person(b)) else { return false };
     a.ground_m.distance(b.ground_m) < TWICE_M && a.bounds.iou(&b.bounds) > TWICE_OVERLAP
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{geometry::PixelBox, pose::Looks};
+
+    /// Somebody who runs, in two runs of sightings: frames 0 to 30, and 29 to 59 as `beside_px` to the right.
+    fn seen_twice(beside_px: f64) -> (Vec<Tracklet>, Vec<Vec<Person>>) {
+        let person = |frame: usize, beside_px: f64| {
+            let min = DVec2::new(5.0 * frame as f64 + beside_px, 100.0);
+            Person {
+                bounds: PixelBox { min, max: min + DVec2::new(25.0, 60.0) },
+                ground_m: DVec3::new((5.0 * frame as f64 + beside_px) / 35.0, 0.0, 0.0),
+                ..Person::blank()
+            }
+        };
+        let (first, second) = (0..31, 29..60);
+        let people: Vec<Vec<Person>> = (0..60)
+            .map(|frame| {
+                let of_first = first.contains(&frame).then(|| person(frame, 0.0));
+                of_first
+                    .into_iter()
+                    .chain(second.contains(&frame).then(|| person(frame, beside_px)))
+                    .collect()
+            })
+            .collect();
+        let run = |frames: std::ops::Range<usize>, later: bool| -> Tracklet {
+            let seen = frames.map(|frame| {
+                let person_index = usize::from(later && frame < 31);
+                let at = people[frame][person_index].ground_m;
+                let place = Place::seen(DVec2::new(at.x, at.z), None);
+                let sighting = Sighting { frame, person_index };
+                Seen { sighting, seconds: frame as f64 / 25.0, place, looks: Looks::default() }
+            });
+            seen.collect()
+        };
+        (vec![run(first.clone(), false), run(second.clone(), true)], people)
+    }
+
+    #[test]
+    fn a_track_that_takes_over_from_another_of_the_same_person_goes_on_with_it() {
+        let (runs, people) = seen_twice(4.0);
+        let joined = hand_over(runs, &people);
+        assert_eq!(joined.len(), 1);
+        let frames: Vec<usize> = joined[0].iter().map(|seen| seen.sighting.frame).collect();
+        assert_eq!(frames, (0..60).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn two_who_stand_beside_each_other_when_one_goes_and_one_comes_stay_two() {
+        let (runs, people) = seen_twice(20.0);
+        assert_eq!(hand_over(runs, &people).len(), 2);
+        // Nor is who was there all the time taken for the one who comes.
+        let (mut runs, people) = seen_twice(4.0);
+        runs[1].truncate(2);
+        assert_eq!(hand_over(runs, &people).len(), 2);
+    }
+}
