@@ -2,7 +2,8 @@
 //!
 //! Boxes that cannot hold a person on the pitch, and people beside it who are not in the match, go first. The pose network
 //! then looks at each of the others; what it is unsure of stays when the detection is clear, as a standing figure in its box
-//! (`pose_score` 0), and goes when it is not. Skeletons that coincide are one person.
+//! (`pose_score` 0), and goes when it is not. Skeletons that coincide are one person; whoever is left without one in a tangle is looked at once more,
+//! without those who were found there ([`erase`]).
 
 mod blazepose;
 mod erase;
@@ -238,16 +239,7 @@ impl PoseEstimator {
             let fresh = |person: &Person| !people.iter().any(|other| same_person(other, person, camera));
             let mut posed = person_from(&seen, detection, camera, pitch).filter(fresh);
             if posed.is_none() && detection.score >= CLEAR {
-                let rivals =
-                    || people.iter().filter(|other| other.bounds.iou(&detection.bounds) > TANGLED_IOU);
-                if rivals().next().is_some() {
-                    let without = erase::without(picture, rivals().map(|other| &other.mask), square);
-                    let mut alone = blazepose::estimate(&mut self.model, &without, square)?;
-                    refine::refine(&mut self.refiner, &mut alone.joints)?;
-                    let sure = alone.score >= SURE_ALONE;
-                    posed =
-                        sure.then(|| person_from(&alone, detection, camera, pitch)).flatten().filter(fresh);
-                }
+                posed = self.alone(picture, square, detection, &people, camera, pitch)?.filter(fresh);
             }
             let unposed = || clear.then(|| standing::in_box(&seen, detection, camera, pitch)).flatten();
             match posed.or_else(unposed) {
@@ -272,6 +264,29 @@ impl PoseEstimator {
             .collect();
         people.iter_mut().zip(all).for_each(|(person, looks)| person.looks = looks);
         Ok(people)
+    }
+
+    /// Somebody in a tangle with `people`, read where these are painted over; `None` when nobody is in the way or nobody is sure to be left.
+    fn alone(
+        &mut self,
+        picture: &RgbImage,
+        square: blazepose::Square,
+        detection: &Detection,
+        people: &[Person],
+        camera: &Camera,
+        pitch: &Pitch,
+    ) -> Result<Option<Person>, PoseError> {
+        let in_the_way = || people.iter().filter(|other| other.bounds.iou(&detection.bounds) > TANGLED_IOU);
+        if in_the_way().next().is_none() {
+            return Ok(None);
+        }
+        let without = erase::without(picture, in_the_way().map(|other| &other.mask), square);
+        let mut seen = blazepose::estimate(&mut self.model, &without, square)?;
+        if seen.score < SURE_ALONE {
+            return Ok(None);
+        }
+        refine::refine(&mut self.refiner, &mut seen.joints)?;
+        Ok(person_from(&seen, detection, camera, pitch))
     }
 
     /// The best of several looks: most people need one, some a second from their hips or closer up, and who is clearly there
