@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{
     Sighting,
+    appearance::MeanLooks,
     links::{Node, Round, join, links},
     motion::Place,
     tracklets::{Seen, Tracklet, tracklets},
@@ -22,8 +23,15 @@ const UNSEEN_PER_S: f64 = 0.8;
 const TWICE_M: f64 = 0.8;
 const TWICE_OVERLAP: f64 = 0.5;
 const TWICE_SHARE: f64 = 0.6;
-/// Somebody who is seen twice may change from one track to another within this time, seconds.
-const HANDOVER_S: f64 = 0.5;
+/// Somebody who is seen twice may change from one track to another within this time, seconds; in this share of the frames that both show they are then
+/// at most so far apart on the pitch, metres, and their boxes overlap by so much. Rougher than for doubles: two looks at one person in a
+/// tangle differ in how low they put the feet.
+const HANDOVER_S: f64 = 1.0;
+const HANDOVER_SHARE: f64 = 0.5;
+const HANDOVER_M: f64 = 1.5;
+const HANDOVER_OVERLAP: f64 = 0.3;
+/// Looks of both tracks must not be less alike than this (logarithm).
+const HANDOVER_LOOKS: f64 = -1.0;
 
 /// Who is who within one shot; every list by frame.
 pub(super) fn chains(
@@ -70,7 +78,7 @@ pub(super) fn chains(
     runs.into_iter().map(|run| run.into_iter().map(|seen| seen.sighting).collect()).collect()
 }
 
-/// Joins tracks of which one begins just before the other ends, where both are sightings of one person in every frame that they share.
+/// Joins tracks of which one begins just before the other ends, where both are sightings of one person in the frames that they share.
 fn hand_over(mut runs: Vec<Tracklet>, people: &[Vec<Person>]) -> Vec<Tracklet> {
     runs.sort_by_key(|run| run.first().map(|seen| seen.sighting));
     let mut kept: Vec<Tracklet> = Vec::new();
@@ -84,7 +92,7 @@ fn hand_over(mut runs: Vec<Tracklet>, people: &[Vec<Person>]) -> Vec<Tracklet> {
     kept
 }
 
-/// How many sightings at the start of `later` are second ones of whom `earlier` shows at its end; `None` when it does not go on from there.
+/// How many sightings at the start of `later` come before the end of `earlier`, whom it goes on with; `None` when it does not.
 fn shared(earlier: &[Seen], later: &[Seen], people: &[Vec<Person>]) -> Option<usize> {
     let (end, start) = (earlier.last()?, later.first()?);
     let goes_on = earlier.first()?.sighting.frame < start.sighting.frame
@@ -92,17 +100,23 @@ fn shared(earlier: &[Seen], later: &[Seen], people: &[Vec<Person>]) -> Option<us
     if !goes_on || !(0.0..=HANDOVER_S).contains(&(end.seconds - start.seconds)) {
         return None;
     }
-    let tail = earlier.iter().rev().take_while(|seen| seen.sighting.frame >= start.sighting.frame);
-    let mut pairs = 0;
-    for seen in tail {
+    let from = earlier.partition_point(|seen| seen.sighting.frame < start.sighting.frame);
+    let (mut pairs, mut near) = (0_usize, 0_usize);
+    for seen in earlier.get(from..)? {
         if let Some(other) = later.iter().find(|other| other.sighting.frame == seen.sighting.frame) {
-            if !coincide(people, seen.sighting, other.sighting) {
-                return None;
-            }
             pairs += 1;
+            near +=
+                usize::from(coincide(people, (seen.sighting, other.sighting), HANDOVER_M, HANDOVER_OVERLAP));
         }
     }
-    (pairs > 0).then(|| later.partition_point(|seen| seen.sighting.frame <= end.sighting.frame))
+    let looks = |run: &[Seen]| {
+        let looks: Vec<_> = run.iter().map(|seen| seen.looks).collect();
+        MeanLooks::of(looks.iter())
+    };
+    let alike = pairs > 0
+        && near as f64 >= HANDOVER_SHARE * pairs as f64
+        && looks(earlier).log_same(&looks(later)) > HANDOVER_LOOKS;
+    alike.then(|| later.partition_point(|seen| seen.sighting.frame <= end.sighting.frame))
 }
 
 /// Leaves out tracks that are a second sighting of somebody for most of their time.
@@ -117,7 +131,7 @@ fn without_doubles(mut runs: Vec<Tracklet>, people: &[Vec<Person>]) -> Vec<Track
         for seen in &run {
             for (place, other) in by_frame.get(seen.sighting.frame).into_iter().flatten() {
                 if let Some(count) = twice.get_mut(*place) {
-                    *count += usize::from(coincide(people, seen.sighting, *other));
+                    *count += usize::from(coincide(people, (seen.sighting, *other), TWICE_M, TWICE_OVERLAP));
                 }
             }
         }
@@ -135,10 +149,11 @@ fn without_doubles(mut runs: Vec<Tracklet>, people: &[Vec<Person>]) -> Vec<Track
     kept
 }
 
-fn coincide(people: &[Vec<Person>], a: Sighting, b: Sighting) -> bool {
+/// Whether two sightings of a frame are at most so far apart, metres, and overlap by more than so much.
+fn coincide(people: &[Vec<Person>], pair: (Sighting, Sighting), far_m: f64, overlap: f64) -> bool {
     let person = |s: Sighting| people.get(s.frame)?.get(s.person_index);
-    let (Some(a), Some(b)) = (person(a), person(b)) else { return false };
-    a.ground_m.distance(b.ground_m) < TWICE_M && a.bounds.iou(&b.bounds) > TWICE_OVERLAP
+    let (Some(a), Some(b)) = (person(pair.0), person(pair.1)) else { return false };
+    a.ground_m.distance(b.ground_m) < far_m && a.bounds.iou(&b.bounds) > overlap
 }
 
 #[cfg(test)]
