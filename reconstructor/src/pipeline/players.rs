@@ -45,13 +45,25 @@ pub(super) fn smooth_poses(
 pub(super) type FrameMasks<'a> = BTreeMap<PersonId, &'a PlayerMask>;
 
 impl Run<'_> {
-    /// Turns shots from behind a goal that stand the wrong way round.
-    pub(super) fn settle_sides(&self, people: &mut [Vec<Person>], cameras: &mut [CameraEstimate]) {
-        for shot in tracking::sides::settle(people, cameras, &self.shots, &self.pitch) {
+    /// Turns shots from behind a goal that stand the wrong way round; notes those of which nothing tells.
+    pub(super) fn settle_sides(&mut self, people: &mut [Vec<Person>], cameras: &mut [CameraEstimate]) {
+        let sides = tracking::sides::settle(people, cameras, &self.shots, &self.pitch);
+        for shot in sides.turned {
             tracing::info!(
                 "shot {}: people before or after it show that its camera stands behind the right goal",
                 shot + 1
             );
+        }
+        for shot in sides.open {
+            let reason = format!(
+                "shot {} is seen from behind a goal, and no shot beside it tells which: it stays where its camera was put, the left one when it was found without \
+                 `--calibration`",
+                shot + 1
+            );
+            tracing::warn!("{reason}");
+            let first = self.shots.shots.get(shot).and_then(|shot| self.clip_frame(shot.frames.start));
+            let (stage, loss) = (Stage::Calibration, Loss::Fallback);
+            self.reporter.note(Failure { stage, loss, frame: first, person: None, reason });
         }
     }
 

@@ -17,10 +17,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     detection::RoleChances,
-    numbers::{Readings, evidence::NumberEvidence},
+    numbers::Readings,
     pose::{Looks, Person},
     tracking::{
-        Sighting, Track,
+        Track,
         across::{self, Clip, Marks},
         appearance::MeanLooks,
     },
@@ -147,11 +147,7 @@ pub(crate) fn join_tracks(
         let team = member.team.filter(|_| member.team_confidence > SURE);
         Some(role as u8 * 3 + team.map_or(0, |team| team as u8 + 1))
     };
-    let number = |sightings: &mut dyn Iterator<Item = Sighting>| {
-        let looks: Vec<_> = sightings.filter_map(|sighting| readings.get(&sighting)).collect();
-        NumberEvidence::of(&looks)
-    };
-    let joined = across::join_tracks(tracks, clip, &Marks { side: &side, number: &number });
+    let joined = across::join_tracks(tracks, clip, &Marks { side: &side, backs: readings });
     let members = assign(&joined, clip.people, pitch);
     (joined, members)
 }

@@ -16,7 +16,10 @@ use super::{
     tracklets::{Seen, Tracklet},
 };
 use crate::{
-    calibration::CameraEstimate, ingest::ClipInfo, numbers::evidence::NumberEvidence, pose::Person,
+    calibration::CameraEstimate,
+    ingest::ClipInfo,
+    numbers::{Reading, Readings, evidence::NumberEvidence},
+    pose::Person,
     shots::ShotList,
 };
 
@@ -52,8 +55,8 @@ pub(crate) struct Clip<'a> {
 pub(crate) struct Marks<'a> {
     /// Team and role of a track as a number, where known.
     pub(crate) side: &'a dyn Fn(PersonId) -> Option<u8>,
-    /// What looks at the backs in these sightings say.
-    pub(crate) number: &'a dyn Fn(&mut dyn Iterator<Item = Sighting>) -> NumberEvidence,
+    /// What looks at backs show.
+    pub(crate) backs: &'a Readings,
 }
 
 /// Joins tracks of the same person. The result is numbered anew, in order of first sighting.
@@ -69,8 +72,10 @@ pub(crate) fn join_tracks(tracks: &[Track], clip: &Clip<'_>, marks: &Marks<'_>) 
         let nodes: Vec<(usize, Node)> =
             runs.iter().enumerate().filter_map(|(i, run)| Some((i, Node::of(run)?))).collect();
         let (places, nodes): (Vec<usize>, Vec<Node>) = nodes.into_iter().unzip();
-        let numbers: Vec<NumberEvidence> =
-            runs.iter().map(|run| (marks.number)(&mut run.iter().map(|seen| seen.sighting))).collect();
+        let looks = |run: &Tracklet| -> Vec<&Reading> {
+            run.iter().filter_map(|seen| marks.backs.get(&seen.sighting)).collect()
+        };
+        let numbers: Vec<NumberEvidence> = runs.iter().map(|run| NumberEvidence::of(&looks(run))).collect();
         let at = |node: usize| places.get(node).copied().unwrap_or(usize::MAX);
         let extra = |from: usize, to: usize| {
             let (a, b) = (runs.get(at(from))?, runs.get(at(to))?);

@@ -23,14 +23,22 @@ const NEAR_M: f64 = 1.5;
 const FOUND_MIN: usize = 4;
 const FOUND_TIMES: usize = 2;
 
-/// Turns shots from behind a goal by half, cameras and people alike, where the shot before or after shows that they stand the wrong way round. Gives
-/// the numbers of the turned shots.
+/// Shots from behind a goal, by number.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Sides {
+    /// Those that were turned.
+    pub(crate) turned: Vec<usize>,
+    /// Those of which no neighbour tells the goal: they stand as they stood.
+    pub(crate) open: Vec<usize>,
+}
+
+/// Turns shots from behind a goal by half, cameras and people alike, where the shot before or after shows that they stand the wrong way round.
 pub(crate) fn settle(
     people: &mut [Vec<Person>],
     cameras: &mut [CameraEstimate],
     shots: &ShotList,
     pitch: &Pitch,
-) -> Vec<usize> {
+) -> Sides {
     let mut turned = Vec::new();
     // Forward, then back: a shot between two from behind goals may be settled by either neighbour.
     let pairs = (1..shots.shots.len()).map(|next| (next - 1, next));
@@ -67,7 +75,8 @@ pub(crate) fn settle(
         }
     }
     turned.sort_unstable();
-    turned
+    let open = settled.iter().enumerate().filter(|(_, settled)| !**settled).map(|(shot, _)| shot).collect();
+    Sides { turned, open }
 }
 
 fn behind_a_goal(cameras: &[CameraEstimate], shot: &Shot, pitch: &Pitch) -> bool {
@@ -148,6 +157,10 @@ mod tests {
         CameraEstimate { camera: Some(camera), ..CameraEstimate::unsolved("") }
     }
 
+    fn turned(shot: usize) -> Sides {
+        Sides { turned: vec![shot], open: Vec::new() }
+    }
+
     fn two_shots() -> ShotList {
         let shots = vec![Shot { frames: 0..10 }, Shot { frames: 10..20 }];
         ShotList { shots, transitions: Vec::new() }
@@ -165,7 +178,7 @@ mod tests {
     fn a_shot_that_stands_the_wrong_way_round_is_turned() {
         let (mut people, mut cameras) = clip(-1.0);
         let before = cameras[12].camera.unwrap();
-        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), [1]);
+        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), turned(1));
         let camera = cameras[12].camera.unwrap();
         assert!((camera.position - DVec3::new(95.0, 22.0, -3.0)).length() < 1e-9);
         // The picture stays as it was: the turned world is where the world was.
@@ -181,25 +194,26 @@ mod tests {
         let (mut people, mut cameras) = clip(-1.0);
         people.reverse();
         cameras.reverse();
-        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), [0]);
+        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), turned(0));
     }
 
     #[test]
     fn a_shot_that_is_right_or_cannot_be_told_stays() {
+        let open = Sides { turned: Vec::new(), open: vec![1] };
         let (mut people, mut cameras) = clip(1.0);
-        assert!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()).is_empty());
+        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), Sides::default());
         // A replay shows other places; too few people say nothing; a main camera is never turned.
         let (mut people, mut cameras) = clip(-1.0);
         for (index, person) in people[10..].iter_mut().flatten().enumerate() {
             person.ground_m += DVec3::new(6.0, 0.0, 5.0 + 3.0 * (index % 8) as f64);
         }
-        assert!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()).is_empty());
+        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), open);
         let (mut people, mut cameras) = clip(-1.0);
         people.iter_mut().for_each(|people| people.truncate(3));
-        assert!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()).is_empty());
+        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), open);
         let (mut people, _) = clip(-1.0);
         let mut cameras = vec![from(DVec3::new(0.0, 18.0, 75.0)); 20];
-        assert!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()).is_empty());
-        assert!(settle(&mut [], &mut [], &two_shots(), &Pitch::default()).is_empty());
+        assert_eq!(settle(&mut people, &mut cameras, &two_shots(), &Pitch::default()), Sides::default());
+        assert_eq!(settle(&mut [], &mut [], &two_shots(), &Pitch::default()), Sides::default());
     }
 }
