@@ -95,13 +95,13 @@ def average_in(average, network, step, keep):
 @torch.no_grad()
 def settle(network, inputs):
     """Measures the batch statistics of averaged weights anew: their running average is of other weights, and one wild batch spoils it for good."""
-    norms = [module for module in network.modules() if isinstance(module, torch.nn.BatchNorm2d)]
+    norms = [module for module in network.modules() if isinstance(module, (torch.nn.BatchNorm1d, torch.nn.BatchNorm2d))]
     for norm in norms:
         norm.reset_running_stats()
         norm.momentum = None  # the plain mean over what comes
     network.train()
     for given in inputs:
-        network(given)
+        network(*given) if isinstance(given, tuple) else network(given)
     for norm in norms:
         norm.momentum = 0.1
 

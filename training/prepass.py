@@ -9,12 +9,15 @@ import cv2
 import numpy as np
 import onnxruntime
 
-from window import samples_per_cell
-
 BOX_MARGIN = 1.5  # as the reconstructor looks at people
 BOX_NOISE = 0.04  # standard deviation of a box edge, of the box's larger side
 INPUT = 256
 POSE_FAILED = 0.1  # below this flag a sample is dropped
+
+
+def samples_per_cell(side, size):
+    """Samples along each axis of a cell, where `side` pixels become `size` cells: each pixel is looked at."""
+    return int(np.clip(np.ceil(side / size - 1e-6), 1, 8))
 
 
 def sample_quickly(image, centre, side, size, per_cell=None):
@@ -54,19 +57,24 @@ def estimate(session, image, box):
     crop = sample_quickly(image, centre, side, INPUT, per_cell=1)[None] / np.float32(255.0)
     landmarks, flag, logits, _, world = session.run(None, {"input_1": crop})
     pixels = centre + (landmarks.reshape(39, 5)[:33, :2].astype(float) / INPUT - 0.5) * side
+    return pixels, _behind_hips(world), _back(sigmoid(logits.reshape(INPUT, INPUT).astype(np.float32)), image.shape, centre, side), float(flag.item())
+
+
+def _behind_hips(world):
     depth = world.reshape(39, 3)[:33, 2].astype(float)
-    return pixels, depth - (depth[23] + depth[24]) / 2, _back(sigmoid(logits.reshape(INPUT, INPUT).astype(np.float32)), image.shape, centre, side), float(flag.item())
+    return depth - (depth[23] + depth[24]) / 2
 
 
 class Look(NamedTuple):
     """What the network sees in one box of a whole picture: joints (33, 2) in its pixels, visibility (33,), mask 0..1 on the pixels inside the
-    square and the picture, of which the first is at `first` (x, y), flag 0..1."""
+    square and the picture, of which the first is at `first` (x, y), flag 0..1, depth (33,) of the joints behind the hips in metres."""
 
     joints: np.ndarray
     visibility: np.ndarray
     mask: np.ndarray
     first: np.ndarray
     flag: float
+    depth: np.ndarray
 
 
 def look(session, picture, box):
@@ -74,7 +82,7 @@ def look(session, picture, box):
     centre = np.array([(box[0] + box[2]) / 2, (box[1] + box[3]) / 2])
     side = max(BOX_MARGIN * max(box[2] - box[0], box[3] - box[1]), 1.0)
     crop = sample_quickly(picture, centre, side, INPUT)[None] / np.float32(255.0)
-    landmarks, flag, logits, _, _ = session.run(None, {"input_1": crop})
+    landmarks, flag, logits, _, world = session.run(None, {"input_1": crop})
     landmarks = landmarks.reshape(39, 5)[:33]
     joints = centre + (landmarks[:, :2].astype(float) / INPUT - 0.5) * side
     limit = np.array([picture.shape[1], picture.shape[0]]) - 1
@@ -82,7 +90,7 @@ def look(session, picture, box):
     last = np.minimum(np.floor(centre + side / 2), limit).astype(int)
     size = np.maximum(last - first + 1, 1)
     mask = _back(sigmoid(logits.reshape(INPUT, INPUT).astype(np.float32)), (size[1], size[0]), centre - first, side)
-    return Look(joints, sigmoid(landmarks[:, 3]), mask / np.float32(255.0), first, float(flag.item()))
+    return Look(joints, sigmoid(landmarks[:, 3]), mask / np.float32(255.0), first, float(flag.item()), _behind_hips(world))
 
 
 def _back(probability, shape, centre, side):

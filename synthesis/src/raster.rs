@@ -106,6 +106,25 @@ pub fn project_moving(
     }));
 }
 
+/// Depths along the optical axis of the first and of the last surface at every sample of `grid`, 0 where there is none.
+#[must_use]
+pub fn first_and_last(camera: &Camera, grid: Grid, points: &[Vec3], triangles: &[[u32; 3]]) -> [Vec<f32>; 2] {
+    let mut vertices = Vec::new();
+    project(camera, &grid, points, &mut vertices);
+    let mut front = Raster::new(grid);
+    front.draw(&vertices, triangles, 0);
+    // The last surface has the smallest inverse depth; taken from a constant just above all of them, it is the largest.
+    let above = vertices.iter().flatten().map(|v| v.z).fold(0.0, f32::max) * 1.5;
+    vertices.iter_mut().flatten().for_each(|v| v.z = above - v.z);
+    let mut back = Raster::new(grid);
+    back.draw(&vertices, triangles, 0);
+    let depths = |raster: &Raster, inverse: &dyn Fn(f32) -> f32| {
+        let samples = (0..grid.width * grid.height).map(|k| raster.at(k % grid.width, k / grid.width));
+        samples.map(|hit| hit.map_or(0.0, |hit| 1.0 / inverse(hit.inverse_depth))).collect()
+    };
+    [depths(&front, &|value| value), depths(&back, &|value| above - value)]
+}
+
 /// The least whole number that is not below; `ceil` is a call on processors without a rounding instruction.
 fn above(value: f32) -> i32 {
     let cut = value as i32;

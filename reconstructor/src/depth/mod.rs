@@ -1,15 +1,15 @@
 //! Section 3.2: the depth map of each player, by a network trained on rendered players.
 //!
 //! The network sees a square around the player (picture and mask, [`window`]) and the painted pose ([`paint`]), and
-//! gives the distance of the visible surface from the upright plane through the player's anchor.
+//! gives the distances of the body's first and last surface from the upright plane through the player's anchor.
 
+mod map;
 mod paint;
 mod surface;
 mod window;
 
 use image::RgbImage;
 use protocol::camera::Camera;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     geometry::Mask,
@@ -17,6 +17,8 @@ use crate::{
     pose::{JOINTS, Joint, Person},
 };
 
+pub use map::DepthMap;
+pub(crate) use paint::LIMBS;
 pub use paint::View;
 pub use surface::WindowSurface;
 pub use window::Window;
@@ -28,16 +30,6 @@ use window::{GRID, PICTURE_SIZE};
 pub const MODEL_NAME: &str = "depth.onnx";
 /// Most pixels of a mask's rectangle: 8K pictures fit, a damaged mask does not fill the memory.
 const MOST_PIXELS: u64 = 7680 * 4320;
-
-/// Depth of one player, on the pixels of the clip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct DepthMap {
-    /// The player's pixels; the network may have removed some from the segmentation's mask.
-    pub mask: Mask,
-    /// Signed distance in metres along the camera's optical axis from the upright virtual plane to the surface, positive
-    /// away from the camera; one per pixel of the mask's rectangle, row by row, 0 where the mask is empty.
-    pub offset_m: Vec<f32>,
-}
 
 /// Why a player got no depth.
 #[derive(Debug, thiserror::Error)]
@@ -84,7 +76,7 @@ impl DepthEstimator {
         Ok(Self { model: Model::load_shipped(MODEL_NAME)? })
     }
 
-    /// The depth of one player in one picture, on the pixels of `mask` (the segmentation's).
+    /// The depth of one player in one picture, where `mask` (the segmentation's) is or nearly so.
     ///
     /// `camera` is that of the picture, `person` gives the joints and the ground point.
     ///
@@ -138,12 +130,12 @@ impl DepthEstimator {
             (&[1, 4, PICTURE_SIZE, PICTURE_SIZE], &picture),
             (&[1, POSE_CHANNELS, GRID, GRID], &pose),
         ])?;
-        let expected = "offset_m and presence of 1×64×64";
-        match outputs.as_slice() {
-            [offset, presence] if [offset, presence].iter().all(|t| t.data.len() == GRID * GRID) => {
-                Ok(WindowSurface::new(window, offset.data.clone(), presence.data.clone()))
-            }
-            _ => Err(self.model.unexpected(expected, &outputs).into()),
+        let cells = PICTURE_SIZE * PICTURE_SIZE;
+        let planes: Option<Vec<Vec<f32>>> =
+            outputs.iter().map(|plane| (plane.data.len() == cells).then(|| plane.data.clone())).collect();
+        match planes.and_then(|planes| <[Vec<f32>; surface::PLANES]>::try_from(planes).ok()) {
+            Some(planes) => Ok(WindowSurface::new(window, planes)),
+            None => Err(self.model.unexpected("six planes of 1×128×128", &outputs).into()),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The pose as the network sees it: every limb painted over the window as a capsule with its depth.
 //!
-//! The skeleton of the pose network tells front from back, which a small picture hardly does. `training/window.py` paints
+//! The skeleton of the pose network tells front from back, which a small picture hardly does. `training/depth/window.py` paints
 //! the same; a test of this folder compares the two.
 
 use glam::{DVec2, DVec3};
@@ -16,14 +16,14 @@ const DEPTH_CLIP: f64 = 3.0;
 /// Width of the ramp of presence beside a limb, metres.
 const EDGE_M: f64 = 0.1;
 /// Channels of the painted pose.
-pub(super) const POSE_CHANNELS: usize = 3;
+pub(super) const POSE_CHANNELS: usize = 4;
 
 /// Middle of the shoulders and of the hips, numbered after the pose network's joints.
 const NECK: usize = JOINTS;
 const PELVIS: usize = JOINTS + 1;
 
 /// Limbs: joint, joint, radius in metres of a man in kit.
-const LIMBS: [(usize, usize, f64); 18] = [
+pub(crate) const LIMBS: [(usize, usize, f64); 18] = [
     (0, NECK, 0.10),
     (11, 12, 0.09),
     (23, 24, 0.11),
@@ -72,8 +72,9 @@ struct Node {
     depth_m: f64,
 }
 
-/// Three planes of [`GRID`]²: presence of a limb; depth of the nearest limb over a cell, or of the closest beside it,
-/// relative to the hips; depth of the upright plane through the hips. Depths in units of [`DEPTH_SCALE_M`].
+/// Four planes of [`GRID`]²: presence of a limb; depth of the nearest limb over a cell, or of the closest beside it,
+/// relative to the hips; that limb's [`side`]; depth of the upright plane through the hips. Depths in units of
+/// [`DEPTH_SCALE_M`].
 ///
 /// `None` unless there are [`JOINTS`] joints.
 pub(super) fn paint(joints: &[Joint], window: &Window, view: View) -> Option<Vec<f32>> {
@@ -81,21 +82,25 @@ pub(super) fn paint(joints: &[Joint], window: &Window, view: View) -> Option<Vec
     let pelvis_y_m = nodes.get(PELVIS)?.at_m.y;
     let limbs = LIMBS
         .iter()
-        .map(|&(a, b, radius_m)| Some((*nodes.get(a)?, *nodes.get(b)?, radius_m)))
+        .map(|&(a, b, radius_m)| {
+            Some(Limb { from: *nodes.get(a)?, to: *nodes.get(b)?, radius_m, side: side(a, b) })
+        })
         .collect::<Option<Vec<_>>>()?;
     let scaled = |metres: f64| (metres / DEPTH_SCALE_M).clamp(-DEPTH_CLIP, DEPTH_CLIP) as f32;
-    let (mut presence, mut depth, mut plane) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut presence, mut depth, mut sides, mut plane) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for row in 0..GRID {
         for column in 0..GRID {
             let at_px = DVec2::new(window.cell(0, column, GRID), window.cell(1, row, GRID));
             let at_m = at_px / view.pixels_per_metre;
-            let (edge_m, depth_m) = nearest(&limbs, at_m);
+            let Painted { edge_m, depth_m, side } = nearest(&limbs, at_m);
             presence.push((1.0 - edge_m / EDGE_M).clamp(0.0, 1.0) as f32);
             depth.push(scaled(depth_m));
+            sides.push(side);
             plane.push(scaled((at_m.y - pelvis_y_m) * view.descent));
         }
     }
     presence.extend(depth);
+    presence.extend(sides);
     presence.extend(plane);
     Some(presence)
 }
@@ -115,22 +120,52 @@ fn nodes(joints: &[Joint], pixels_per_metre: f64) -> Option<Vec<Node>> {
     Some(nodes)
 }
 
-/// Distance to the closest limb's border (negative inside) and the depth to paint, metres.
-fn nearest(limbs: &[(Node, Node, f64)], at_m: DVec2) -> (f64, f64) {
-    let (mut edge_m, mut beside_m, mut covered_m) = (f64::INFINITY, 0.0, f64::INFINITY);
-    for (a, b, radius_m) in limbs {
-        let along = b.at_m - a.at_m;
-        let share = ((at_m - a.at_m).dot(along) / along.length_squared().max(1e-9)).clamp(0.0, 1.0);
-        let distance_m = (at_m - a.at_m - along * share).length() - radius_m;
-        let depth_m = a.depth_m + share * (b.depth_m - a.depth_m);
-        if distance_m <= 0.0 {
-            covered_m = depth_m.min(covered_m);
+/// A limb over the window.
+struct Limb {
+    from: Node,
+    to: Node,
+    radius_m: f64,
+    side: f32,
+}
+
+/// +1 for a limb of the person's left, −1 for one of the right, 0 for what joins both. The pose network's left joints have
+/// odd numbers.
+fn side(from: usize, to: usize) -> f32 {
+    let middle = [from, to].iter().any(|&joint| joint == 0 || joint >= NECK);
+    match (middle, from % 2, to % 2) {
+        (false, 1, 1) => 1.0,
+        (false, 0, 0) => -1.0,
+        _ => 0.0,
+    }
+}
+
+/// What is painted into a cell.
+struct Painted {
+    /// Distance to the closest limb's border, metres, negative inside.
+    edge_m: f64,
+    depth_m: f64,
+    side: f32,
+}
+
+fn nearest(limbs: &[Limb], at_m: DVec2) -> Painted {
+    let mut beside = Painted { edge_m: f64::INFINITY, depth_m: 0.0, side: 0.0 };
+    let mut covering: Option<(f64, f32)> = None;
+    for Limb { from, to, radius_m, side } in limbs {
+        let along = to.at_m - from.at_m;
+        let share = ((at_m - from.at_m).dot(along) / along.length_squared().max(1e-9)).clamp(0.0, 1.0);
+        let edge_m = (at_m - from.at_m - along * share).length() - radius_m;
+        let depth_m = from.depth_m + share * (to.depth_m - from.depth_m);
+        if edge_m <= 0.0 && covering.is_none_or(|(nearer_m, _)| depth_m < nearer_m) {
+            covering = Some((depth_m, *side));
         }
-        if distance_m < edge_m {
-            (edge_m, beside_m) = (distance_m, depth_m);
+        if edge_m < beside.edge_m {
+            beside = Painted { edge_m, depth_m, side: *side };
         }
     }
-    (edge_m, if covered_m.is_finite() { covered_m } else { beside_m })
+    match covering {
+        Some((depth_m, side)) => Painted { depth_m, side, ..beside },
+        None => beside,
+    }
 }
 
 #[cfg(test)]
@@ -158,9 +193,10 @@ mod tests {
         assert_eq!((at(0, 32, 52), at(0, 2, 2)), (1.0, 0.0));
         assert!((at(1, 31, 51) + 0.8).abs() < 0.03, "the ankle is 0.4 m in front: {}", at(1, 31, 51));
         assert!((at(1, 31, 41) + 0.4).abs() < 0.03, "halfway down the leg: {}", at(1, 31, 41));
+        assert_eq!((at(2, 31, 51), at(2, 31, 31)), (1.0, 0.0), "the leg is the left one");
         let below = (16.5 / 32.0) * 0.25 / DEPTH_SCALE_M;
         assert!(
-            (f64::from(at(2, 0, 48)) - below).abs() < 1e-6,
+            (f64::from(at(3, 0, 48)) - below).abs() < 1e-6,
             "lower on the upright plane is further from a camera above"
         );
     }

@@ -1,4 +1,4 @@
-//! The estimator against the trainer's arithmetic (`training/fixture.py` wrote the vector), and against hostile input.
+//! The estimator against the trainer's arithmetic (`training/depth/fixture.py` wrote the vector), and against hostile input.
 
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
@@ -15,8 +15,8 @@ struct Vector {
     window: [f64; 3],
     picture: Vec<(usize, f32)>,
     pose: Vec<(usize, f32)>,
-    offset_m: Vec<(usize, f64)>,
-    presence: Vec<(usize, f64)>,
+    /// Values of the six planes.
+    planes: [Vec<(usize, f64)>; surface::PLANES],
 }
 
 /// Read when the test runs: the vector changes with the shipped network.
@@ -75,14 +75,12 @@ fn the_network_says_here_what_it_says_to_the_trainer() {
     let vector = Vector::read();
     let (image, mask) = player();
     let surface = estimator.surface(&image, vector.view(), &vector.joints(), &mask).unwrap();
-    let at = |cell: usize| {
-        DVec2::new(surface.window().cell(0, cell % GRID, GRID), surface.window().cell(1, cell / GRID, GRID))
-    };
-    for &(cell, expected) in &vector.presence {
-        assert!((surface.presence_at(at(cell)) - expected).abs() < 1e-3, "presence of cell {cell}");
-    }
-    for &(cell, expected) in &vector.offset_m {
-        assert!((surface.offset_at(at(cell)) - expected).abs() < 1e-3, "distance in cell {cell}");
+    for (plane, expected) in vector.planes.iter().enumerate() {
+        assert!(expected.len() >= 20);
+        for &(cell, expected) in expected {
+            let off = (surface.value(plane, cell) - expected).abs();
+            assert!(off < 1e-3, "plane {plane}, cell {cell}: {off} off");
+        }
     }
 }
 
@@ -103,13 +101,26 @@ fn a_depth_map_covers_the_mask_and_stays_near_the_plane() {
         ..Person::blank()
     };
     let map = estimator.estimate(&image, &camera, &person, &mask).unwrap();
-    assert_eq!((map.mask.width, map.mask.height), (mask.width, mask.height));
-    assert_eq!(map.offset_m.len(), map.mask.coverage.len());
-    let (kept, given) = (map.mask.area_px(), mask.area_px());
-    assert!(kept * 10 > given * 7 && kept <= given, "{kept} of {given} pixels kept");
-    assert!(map.offset_m.iter().all(|d| d.abs() <= 0.48), "distances are of the network's range");
-    let (near, far) = map.offset_m.iter().fold((0.0f32, 0.0f32), |(a, b), &d| (a.min(d), b.max(d)));
-    assert!(far - near > 0.1, "a body is not flat: {near}..{far}");
+    assert!(map.is_whole());
+    let (kept, given) = (map.mask(), mask.clone());
+    let (mut both, mut either) = (0, 0);
+    for (x, y) in (0..64).flat_map(|y| (0..64).map(move |x| (x, y))) {
+        let (kept, given) = (kept.at(x, y) >= 128, given.at(x, y) >= 128);
+        both += usize::from(kept && given);
+        either += usize::from(kept || given);
+    }
+    assert!(both * 10 > either * 7, "{both} of {either} pixels agree with the segmentation");
+    let inside = |plane: &[i16]| -> Vec<i16> {
+        plane.iter().zip(&map.coverage).filter(|(_, c)| **c >= 128).map(|(mm, _)| *mm).collect()
+    };
+    let (front, back) = (inside(&map.front_mm), inside(&map.back_mm));
+    let (near, far) = front.iter().fold((0, 0), |(a, b), &d| (a.min(d), b.max(d)));
+    assert!(far - near > 100, "a body is not flat: {near}..{far} mm");
+    let mut thickness: Vec<i16> = front.iter().zip(&back).map(|(front, back)| back - front).collect();
+    thickness.sort_unstable();
+    let middle = thickness[thickness.len() / 2];
+    assert!((40..400).contains(&middle), "half of the body is thicker than {middle} mm");
+    assert!(thickness[0] >= 0);
 }
 
 #[test]

@@ -1,15 +1,15 @@
 //! The square of the picture that the depth network looks at, of fixed metric size around one player's mask.
 //!
-//! `training/window.py` does the same arithmetic; a test of this folder compares the two on a rendered player.
+//! `training/depth/window.py` does the same arithmetic; a test of this folder compares the two on a rendered player.
 
 use glam::DVec2;
 use image::RgbImage;
 
 use crate::geometry::Mask;
 
-/// Samples along one side of the picture that the network sees.
+/// Samples along one side of the picture that the network sees, and cells along one side of its output.
 pub(super) const PICTURE_SIZE: usize = 128;
-/// Cells along one side of the network's output and of the painted pose.
+/// Cells along one side of the painted pose.
 pub(super) const GRID: usize = 64;
 /// Side of the window at the player, metres: a player with arms stretched fits.
 const WINDOW_M: f64 = 2.2;

@@ -1,12 +1,16 @@
 //! Section 4.4: a textured mesh per player from its depth map.
 //!
-//! Every pixel of the player becomes a point of the world, neighbouring pixels become faces, the picture becomes the
-//! texture. Only the side that the camera saw is there: the back of the body is open.
+//! Between its first and its last surface a body fills a [`volume`]; the mesh is the closed surface round it ([`nets`]). What the
+//! camera saw takes its colours from the picture, the rest is guessed ([`behind`]).
 
+mod behind;
+mod charts;
 mod contact;
 mod decimate;
-mod grid;
+mod nets;
+mod pieces;
 mod texture;
+mod volume;
 
 use glam::{DVec2, DVec3};
 use image::RgbImage;
@@ -16,7 +20,6 @@ use thiserror::Error;
 use crate::{depth::DepthMap, pose::Person};
 
 pub use contact::MAX_CORRECTION_M;
-pub use grid::{DEPTH_JUMP_M, DEPTH_JUMP_PIXELS};
 
 /// The surface of one player in one frame.
 #[derive(Clone, Debug)]
@@ -29,7 +32,7 @@ pub struct BodySurface {
     pub anchor_m: DVec3,
     /// Positions in metres relative to the anchor, world axes; texture coordinates 0..1 into `texture`.
     pub mesh: Mesh,
-    /// The piece of the clip that the body is seen in.
+    /// Left the piece of the clip that the body is seen in, right the colours of what is not seen.
     pub texture: RgbImage,
     /// 0..1.
     pub confidence: f32,
@@ -63,7 +66,7 @@ pub struct MeshBudget {
 
 impl Default for MeshBudget {
     fn default() -> Self {
-        Self { triangles: 1_000 }
+        Self { triangles: 1_200 }
     }
 }
 
@@ -72,12 +75,12 @@ impl Default for MeshBudget {
 pub enum MeshError {
     /// The depth map's arrays do not fit its rectangle.
     #[error(
-        "the depth map of {width}×{height} pixels has {coverage} coverages and {offsets} depths; estimate it again"
+        "the depth map of {width}×{height} cells has {coverage} coverages and {offsets} depths; estimate it again"
     )]
     Sizes {
-        /// Columns of the mask.
+        /// Cells in a row.
         width: u32,
-        /// Rows of the mask.
+        /// Rows.
         height: u32,
         /// Coverages given.
         coverage: usize,
@@ -119,6 +122,19 @@ impl VirtualPlane {
         })
     }
 
+    /// Tangent of the angle at which the camera looks down on the anchor.
+    fn descent(&self) -> f64 {
+        let sight = self.anchor_m - self.camera.position;
+        -sight.y / sight.with_y(0.0).length().max(1e-6)
+    }
+
+    /// Metres behind the plane along the optical axis, and the pixel, of a point of the world; `None` behind the camera.
+    pub(crate) fn offset(&self, point_m: DVec3) -> Option<(DVec2, f64)> {
+        let pixel = self.camera.project(point_m)?;
+        let on_plane = self.point(pixel, 0.0)?;
+        Some((pixel, (point_m - on_plane).dot(self.forward)))
+    }
+
     /// The world point seen at `pixel` whose camera depth is the plane's plus `offset_m`.
     pub(crate) fn point(&self, pixel: DVec2, offset_m: f64) -> Option<DVec3> {
         let ray = self.camera.ray(pixel);
@@ -130,11 +146,11 @@ impl VirtualPlane {
     }
 }
 
-/// Lifts a player's pixels to a textured mesh on the pitch.
+/// Lifts a player to a closed textured mesh on the pitch.
 ///
 /// `image` is the frame that `depth` was estimated on. The mesh stands on the pitch, or as high above it as `figure` says: see
 /// [`MAX_CORRECTION_M`].
-/// Triangles are counter-clockwise seen from the camera.
+/// Triangles are counter-clockwise seen from outside.
 ///
 /// # Errors
 /// [`MeshError`] when the depth map is inconsistent, the plane is not seen, or nothing connected remains.
@@ -149,24 +165,29 @@ pub fn lift(
     let anchor_m = person.ground_m.with_y(0.0);
     let plane = VirtualPlane::new(camera, anchor_m).ok_or(MeshError::NoPlane)?;
     let footprint_m = 1.0 / camera.pixels_per_metre(anchor_m);
-    let mut surface = grid::connect(depth, &plane, footprint_m)?;
-    surface.keep_large_pieces()?;
+    let volume = volume::Volume::fill(depth, person, &plane, footprint_m)?;
+    let mut surface = pieces::lifted(&nets::around(&volume), &volume, depth, &plane);
+    surface.keep_large()?;
     let correction_m =
         contact::correction(&surface.points_m, person, &plane, footprint_m, figure.above_ground_m);
-    let texture = texture::cut_out(image, &depth.mask, &surface.pixels);
-    let positions_m = surface
-        .points_m
+    surface.simplify(budget.triangles);
+    let mask = depth.mask();
+    let pixels: Vec<DVec2> = surface.points_m.iter().filter_map(|point| camera.project(*point)).collect();
+    let seen = texture::cut_out(image, &mask, &pixels);
+    let guessed = behind::colours(&seen, &mask, person, 1.0 / footprint_m);
+    let charts = charts::split(&surface, depth, &plane, &seen);
+    let positions_m = charts
+        .points
         .iter()
+        .filter_map(|&index| surface.points_m.get(index as usize))
         .map(|point| (*point - anchor_m + DVec3::Y * correction_m).as_vec3().to_array())
         .collect();
-    let uvs = surface.pixels.iter().map(|pixel| texture.uv(*pixel)).collect();
-    let mesh = Mesh { positions_m, uvs, triangles: surface.triangles };
     Ok(BodySurface {
         person: figure.person,
         frame: figure.frame,
         anchor_m,
-        mesh: decimate::to_budget(mesh, budget.triangles),
-        texture: texture.image,
+        mesh: Mesh { positions_m, uvs: charts.uvs, triangles: charts.triangles },
+        texture: texture::side_by_side(&seen.image, &guessed),
         confidence: person.pose_score.clamp(0.0, 1.0),
     })
 }

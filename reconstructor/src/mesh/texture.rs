@@ -16,8 +16,9 @@ const SAFE_REACH: usize = 1;
 pub(super) struct CutOut {
     /// The piece.
     pub(super) image: RgbImage,
-    x0: i32,
-    y0: i32,
+    /// Pixel of the frame that its first pixel is.
+    pub(super) x0: i32,
+    pub(super) y0: i32,
 }
 
 impl CutOut {
@@ -63,6 +64,14 @@ pub(super) fn cut_out(image: &RgbImage, mask: &Mask, pixels: &[DVec2]) -> CutOut
     let image =
         RgbImage::from_fn(width as u32, height as u32, |x, y| colours[y as usize * width + x as usize]);
     CutOut { image, x0: low.x, y0: low.y }
+}
+
+/// Two pictures of one size as one.
+pub(super) fn side_by_side(left: &RgbImage, right: &RgbImage) -> RgbImage {
+    let mut both = RgbImage::new(left.width() + right.width(), left.height().max(right.height()));
+    image::imageops::replace(&mut both, left, 0, 0);
+    image::imageops::replace(&mut both, right, i64::from(left.width()), 0);
+    both
 }
 
 /// Gives every unfilled pixel that `may` change the mean colour of its filled neighbours; returns how many it filled.

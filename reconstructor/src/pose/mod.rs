@@ -139,9 +139,8 @@ pub struct Person {
     pub looks: Looks,
 }
 
-#[cfg(test)]
 impl Person {
-    /// Somebody of whom nothing is known, for tests to fill in.
+    /// Somebody of whom nothing is known, to be filled in.
     pub(crate) fn blank() -> Self {
         Self {
             bounds: PixelBox { min: DVec2::ZERO, max: DVec2::ONE },
@@ -211,6 +210,28 @@ impl PoseEstimator {
         let seen = blazepose::estimate(&mut self.model, picture, square)?;
         let mask = silhouette::clean(&seen.mask, &seen.joints);
         Ok(Some(Look { joints: seen.joints, mask, score: seen.score }))
+    }
+
+    /// Whoever the networks see in one box, read as the product reads people, wherever they stand (the place on the pitch is left blank):
+    /// for measuring the stages that build on poses. `None` when nobody is.
+    ///
+    /// # Errors
+    /// When a network fails.
+    pub fn person_in(&mut self, picture: &RgbImage, bounds: &PixelBox) -> Result<Option<Person>, PoseError> {
+        let Some(square) = blazepose::Square::round(bounds).filter(|_| !picture.is_empty()) else {
+            return Ok(None);
+        };
+        let mut seen = self.look_again(picture, square, bounds, true)?;
+        refine::refine(&mut self.refiner, &mut seen.joints)?;
+        let mask = silhouette::clean(&seen.mask, &seen.joints);
+        let Some(bounds) = silhouette::bounds(&mask, &seen.joints) else { return Ok(None) };
+        Ok((seen.score >= POSE_SCORE_MIN).then(|| Person {
+            bounds,
+            pose_score: seen.score,
+            joints: seen.joints,
+            mask,
+            ..Person::blank()
+        }))
     }
 
     /// Everybody of `detections` who can stand on the pitch, from left to right of the picture.

@@ -11,7 +11,7 @@ use synthesis::{
 const USAGE: &str = "usage: dataset depth  --out DIR --count N [--seed S] [--split train|validation|test] [--motions FILE] [--shard N] [--height LOW..HIGH] [--numbers LOW..HIGH]
        dataset frames --out DIR --count N [--seed S] [--split train|validation|test] [--size WxH] [--per-match N] [--maps yes|no] [--kinds KIND,KIND,…]
 
-depth writes shard-NNNN/{crops.npy, mask.npy, offset_mm.npy, meta.jsonl}: rendered players for the depth network.
+depth writes shard-NNNN/{crops,mask,offset_mm,front_mm,back_mm}.npy and meta.jsonl: rendered players for the depth network.
 frames writes images/, labels/ (YOLO: ball, goalkeeper, player, referee), frames.jsonl and maps/: whole pictures.
 example: cargo run -p synthesis --bin dataset -- frames --out target/datasets/frames-train --count 2000";
 

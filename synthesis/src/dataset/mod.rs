@@ -110,9 +110,13 @@ fn write_shard(folder: &Path, samples: &[Sample]) -> Result<(), SynthesisError> 
     npy::write(&folder.join("crops.npy"), "|u1", &[count, CROP, CROP, 3], &crops)?;
     let masks: Vec<u8> = samples.iter().flat_map(|s| s.mask.iter().copied()).collect();
     npy::write(&folder.join("mask.npy"), "|u1", &[count, CROP, CROP], &masks)?;
-    let offsets: Vec<u8> =
-        samples.iter().flat_map(|s| s.offsets_mm.iter().flat_map(|o| o.to_le_bytes())).collect();
-    npy::write(&folder.join("offset_mm.npy"), "<i2", &[count, OFFSETS, OFFSETS], &offsets)?;
+    let plane = |name: &str, of: fn(&Sample) -> &[i16]| {
+        let bytes: Vec<u8> = samples.iter().flat_map(of).flat_map(|offset| offset.to_le_bytes()).collect();
+        npy::write(&folder.join(name), "<i2", &[count, OFFSETS, OFFSETS], &bytes)
+    };
+    plane("offset_mm.npy", |sample| &sample.offsets_mm)?;
+    plane("front_mm.npy", |sample| &sample.front_mm)?;
+    plane("back_mm.npy", |sample| &sample.back_mm)?;
     let mut lines = Vec::new();
     for sample in samples {
         serde_json::to_writer(&mut lines, &sample.meta)

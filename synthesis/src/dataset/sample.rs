@@ -15,7 +15,7 @@ use crate::{
     SynthesisError,
     gait::{self, Action},
     motion::Pose,
-    raster::Grid,
+    raster::{Grid, first_and_last},
     render::{Actor, Scene, Window},
     rig::{self, Placement},
     sensor::Sensor,
@@ -50,6 +50,8 @@ pub struct SampleMeta {
     pub height_px: f64,
     /// Share of the person's samples that nobody covers, inside the crop.
     pub visible_share: f32,
+    /// The whole boxes (left, top, right, bottom, clip pixels) of the others who are in the crop.
+    pub others_px: Vec<[f64; 4]>,
     /// BlazePose's 33 landmarks in clip pixels.
     pub joints_px: Vec<[f64; 2]>,
     /// The same in world metres.
@@ -62,8 +64,12 @@ pub struct Sample {
     pub crop: RgbImage,
     /// 255 where the person is in front, `CROP`².
     pub mask: Vec<u8>,
-    /// Millimetres behind the virtual plane, `OFFSETS`².
+    /// Millimetres from the virtual plane to the surface that is seen, positive away from the camera, `OFFSETS`².
     pub offsets_mm: Vec<i16>,
+    /// The same to the body's first surface, also where somebody stands before it.
+    pub front_mm: Vec<i16>,
+    /// The same to the body's last surface.
+    pub back_mm: Vec<i16>,
     /// The rest.
     pub meta: SampleMeta,
 }
@@ -151,11 +157,11 @@ pub(super) fn draw(
     let scene = Scene { stadium, actors, solids: Vec::new(), nets: None };
 
     // The crop: the box of the whole person, hidden parts too, made square and wide enough for the pose network.s look (1.5 times the box).
-    let (mut least, mut most) = (DVec2::MAX, DVec2::MIN);
-    for pixel in scene.actors[0].posed.positions.iter().filter_map(|p| camera.project(p.as_dvec3())) {
-        least = least.min(pixel);
-        most = most.max(pixel);
-    }
+    let boxed = |actor: &Actor<'_>| {
+        let seen = actor.posed.positions.iter().filter_map(|p| camera.project(p.as_dvec3()));
+        seen.fold((DVec2::MAX, DVec2::MIN), |(least, most), pixel| (least.min(pixel), most.max(pixel)))
+    };
+    let (least, most) = boxed(&scene.actors[0]);
     let (mut centre, mut side) = ((least + most) / 2.0, (most - least).max_element() * 1.6);
     if options.split == Split::Train {
         // The detector's boxes are never exact.
@@ -178,6 +184,9 @@ pub(super) fn draw(
     let grid = Grid { origin_px: corner.to_array(), per_px: 1.0 / scale, width: CROP, height: CROP };
     let hits = scene.first_hits(&camera, grid);
     let mask: Vec<u8> = hits.iter().map(|hit| if matches!(hit, Some((0, _))) { 255 } else { 0 }).collect();
+    let mut in_crop: Vec<usize> = hits.iter().flatten().map(|hit| hit.0).filter(|&actor| actor > 0).collect();
+    in_crop.sort_unstable();
+    in_crop.dedup();
     let alone = Scene { stadium, actors: scene.actors[..1].to_vec(), solids: Vec::new(), nets: None };
     let whole = if scene.actors.len() > 1 {
         alone.first_hits(&camera, grid).iter().flatten().count()
@@ -192,19 +201,25 @@ pub(super) fn draw(
         width: OFFSETS,
         height: OFFSETS,
     };
-    let offsets_mm = scene
-        .first_hits(&camera, half)
-        .iter()
-        .enumerate()
-        .map(|(place, hit)| match hit {
-            Some((0, depth)) => {
-                let pixel = half.pixel(place % OFFSETS, place / OFFSETS);
-                let offset = f64::from(*depth) - plane_depth(&camera, anchor, pixel.into());
-                (offset * 1000.0).round().clamp(-32_000.0, 32_000.0) as i16
-            }
-            _ => NO_OFFSET,
-        })
-        .collect();
+    let millimetres = |place: usize, depth: f32| {
+        let pixel = half.pixel(place % OFFSETS, place / OFFSETS);
+        let offset = f64::from(depth) - plane_depth(&camera, anchor, pixel.into());
+        (offset * 1000.0).round().clamp(-32_000.0, 32_000.0) as i16
+    };
+    let seen = scene.first_hits(&camera, half);
+    let offsets_mm = seen.iter().enumerate().map(|(place, hit)| match hit {
+        Some((0, depth)) => millimetres(place, *depth),
+        _ => NO_OFFSET,
+    });
+    let body = &scene.actors[0];
+    let surfaces = first_and_last(&camera, half, &body.posed.positions, &body.figure.triangles);
+    let [front_mm, back_mm] = surfaces.map(|depths| {
+        let offset = |(place, depth): (usize, &f32)| {
+            if *depth > 0.0 { millimetres(place, *depth) } else { NO_OFFSET }
+        };
+        depths.iter().enumerate().map(offset).collect()
+    });
+    let offsets_mm = offsets_mm.collect();
 
     let meta = SampleMeta {
         index,
@@ -220,13 +235,18 @@ pub(super) fn draw(
         yaw,
         height_px: most.y - least.y,
         visible_share: visible as f32 / whole.max(1) as f32,
+        others_px: in_crop
+            .iter()
+            .map(|&actor| boxed(&scene.actors[actor]))
+            .map(|(least, most)| [least.x, least.y, most.x, most.y])
+            .collect(),
         joints_px: joints
             .iter()
             .map(|j| camera.project(j.as_dvec3()).unwrap_or(DVec2::splat(-1e4)).to_array())
             .collect(),
         joints_m: joints.iter().map(|j| j.as_dvec3().to_array()).collect(),
     };
-    Ok(Sample { crop, mask, offsets_mm, meta })
+    Ok(Sample { crop, mask, offsets_mm, front_mm, back_mm, meta })
 }
 
 /// Depth along the optical axis of the virtual plane of `anchor` at a pixel: the upright plane through the anchor

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{
     SynthesisError,
     dataset::plane_depth,
-    raster::{self, Grid, Raster},
+    raster::{self, Grid},
     render::Actor,
 };
 
@@ -50,22 +50,9 @@ pub(super) struct PersonMaps {
 impl PersonMaps {
     pub(super) fn draw(camera: &Camera, actor: &Actor<'_>, tile: Tile) -> Self {
         let grid = Grid::over_pixels(tile.first, tile.size, 1);
-        let mut vertices = Vec::new();
-        raster::project(camera, &grid, &actor.posed.positions, &mut vertices);
         let triangles = actor.figure.triangles.as_slice();
-        let mut front = Raster::new(grid);
-        front.draw(&vertices, triangles, 0);
-        // The last surface has the smallest inverse depth; taken from a constant just above all of them, it is the largest.
-        let above = vertices.iter().flatten().map(|v| v.z).fold(0.0, f32::max) * 1.5;
-        vertices.iter_mut().flatten().for_each(|v| v.z = above - v.z);
-        let mut back = Raster::new(grid);
-        back.draw(&vertices, triangles, 0);
-        let depth = |raster: &Raster, inverse: &dyn Fn(f32) -> f32| {
-            let samples =
-                (0..tile.size[0] * tile.size[1]).map(|k| raster.at(k % tile.size[0], k / tile.size[0]));
-            samples.map(|hit| hit.map_or(0.0, |hit| 1.0 / inverse(hit.inverse_depth))).collect()
-        };
-        Self { tile, front_m: depth(&front, &|value| value), back_m: depth(&back, &|value| above - value) }
+        let [front_m, back_m] = raster::first_and_last(camera, grid, &actor.posed.positions, triangles);
+        Self { tile, front_m, back_m }
     }
 
     /// Pixels of the person, hidden or not.

@@ -6,8 +6,10 @@ Pixels: origin at the centre of the top-left pixel. Metres: across the line of s
 
 import numpy as np
 
+from prepass import samples_per_cell
+
 PICTURE_SIZE = 128  # samples along one side of the picture that the network sees
-GRID = 64  # cells along one side of its output, and of the painted pose
+GRID = 64  # cells along one side of the painted pose; the output has PICTURE_SIZE
 WINDOW_M = 2.2  # side of the window at the player, metres
 WINDOW_SLACK = 1.15  # the window is at least this many times the player's box (dives, stretched arms)
 DEPTH_SCALE_M = 0.5  # metres that are 1.0 in the painted channels
@@ -65,22 +67,25 @@ def sample(image, centre, side, size):
     return fine.reshape(size, n, size, n, -1).mean((1, 3))
 
 
-def samples_per_cell(side, size):
-    return int(np.clip(np.ceil(side / size - 1e-6), 1, 8))
-
-
 def _neighbours(positions, length):
     clamped = np.clip(positions, 0.0, length - 1.0)
     low = np.floor(clamped).astype(int)
     return low, np.minimum(low + 1, length - 1), clamped - low
 
 
+def limb_side(first, second):
+    """+1 for a limb of the person's left, −1 for one of the right, 0 for what joins both."""
+    if first in (0, NECK, PELVIS) or second in (NECK, PELVIS) or (first - second) % 2:
+        return 0.0
+    return 1.0 if first % 2 else -1.0
+
+
 def paint(joints_px, joints_z_m, centre, side, pixels_per_metre, tangent, size=GRID):
-    """The pose over the window, (3, size, size) float64.
+    """The pose over the window, (4, size, size) float64.
 
     Channel 0: presence, 1 inside a limb, falling to 0 over `EDGE_M`. Channel 1: depth of the nearest limb that covers the cell,
-    or of the closest one beside it, relative to the hips. Channel 2: depth of the upright plane through the hips there, from
-    the slope `tangent` at which the camera looks down. Depths in units of `DEPTH_SCALE_M`.
+    or of the closest one beside it, relative to the hips. Channel 2: `limb_side` of that limb. Channel 3: depth of the upright
+    plane through the hips there, from the slope `tangent` at which the camera looks down. Depths in units of `DEPTH_SCALE_M`.
     """
     joints = np.concatenate([joints_px, [(joints_px[11] + joints_px[12]) / 2, (joints_px[23] + joints_px[24]) / 2]])
     depth = np.concatenate([joints_z_m, [(joints_z_m[11] + joints_z_m[12]) / 2, (joints_z_m[23] + joints_z_m[24]) / 2]])
@@ -89,18 +94,19 @@ def paint(joints_px, joints_z_m, centre, side, pixels_per_metre, tangent, size=G
     y = ((centre[1] + steps) / pixels_per_metre)[:, None]
     joints = joints / pixels_per_metre
     covered = np.full((size, size), np.inf)
-    beside = np.zeros((size, size))
+    beside, covering, aside = (np.zeros((size, size)) for _ in range(3))
     edge = np.full((size, size), np.inf)
     for first, second, radius in LIMBS:
         a, d = joints[first], joints[second] - joints[first]
         t = np.clip(((x - a[0]) * d[0] + (y - a[1]) * d[1]) / max(d @ d, 1e-9), 0.0, 1.0)
         distance = np.sqrt((x - a[0] - t * d[0]) ** 2 + (y - a[1] - t * d[1]) ** 2) - radius
         z = depth[first] + t * (depth[second] - depth[first])
-        covered = np.where((distance <= 0.0) & (z < covered), z, covered)
-        beside = np.where(distance < edge, z, beside)
+        nearer, closer = (distance <= 0.0) & (z < covered), distance < edge
+        covered, covering = np.where(nearer, z, covered), np.where(nearer, limb_side(first, second), covering)
+        beside, aside = np.where(closer, z, beside), np.where(closer, limb_side(first, second), aside)
         edge = np.minimum(edge, distance)
     presence = np.clip(1.0 - edge / EDGE_M, 0.0, 1.0)
-    nearest = np.where(np.isfinite(covered), covered, beside)
+    inside = np.isfinite(covered)
     plane = np.broadcast_to((y - joints[PELVIS][1]) * tangent, (size, size))
-    scaled = np.clip(np.stack([nearest, plane]) / DEPTH_SCALE_M, -DEPTH_CLIP, DEPTH_CLIP)
-    return np.concatenate([presence[None], scaled])
+    nearest, plane = (np.clip(z / DEPTH_SCALE_M, -DEPTH_CLIP, DEPTH_CLIP) for z in (np.where(inside, covered, beside), plane))
+    return np.stack([presence, nearest, np.where(inside, covering, aside), plane])

@@ -1,0 +1,137 @@
+//! The two surfaces of a player on their own grid of cells.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::Mask;
+
+/// Most cells of a map: the network's output is far smaller, a damaged map does not fill the memory.
+const MOST_CELLS: u64 = 1 << 20;
+
+/// Depth of one player, first and last surface, over square cells of the clip's picture.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DepthMap {
+    /// Pixel of the clip in the middle of the first cell.
+    pub first_px: DVec2,
+    /// Side of a cell, pixels of the clip.
+    pub cell_px: f64,
+    /// Cells in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Share of each cell that shows the player, 0..255, row by row.
+    pub coverage: Vec<u8>,
+    /// Signed distance in millimetres along the camera's optical axis from the upright virtual plane to the surface that is seen,
+    /// positive away from the camera; 0 where nothing of the player is.
+    pub front_mm: Vec<i16>,
+    /// The same to the body's last surface, which the network only guesses. Never smaller than `front_mm`.
+    pub back_mm: Vec<i16>,
+}
+
+impl DepthMap {
+    /// Whether sizes and numbers fit together.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        let cells = u64::from(self.width) * u64::from(self.height);
+        let lengths = [self.coverage.len(), self.front_mm.len(), self.back_mm.len()];
+        cells <= MOST_CELLS
+            && lengths.iter().all(|&length| length as u64 == cells)
+            && self.first_px.is_finite()
+            && self.cell_px.is_finite()
+            && self.cell_px > 1e-3
+    }
+
+    /// The middle of a cell, pixels of the clip; whole numbers are cells.
+    #[must_use]
+    pub fn pixel(&self, cell: DVec2) -> DVec2 {
+        self.first_px + cell * self.cell_px
+    }
+
+    /// Where a pixel of the clip lies on the cells.
+    #[must_use]
+    pub fn place(&self, pixel: DVec2) -> DVec2 {
+        (pixel - self.first_px) / self.cell_px
+    }
+
+    /// Coverage of a cell; 0 outside.
+    #[must_use]
+    pub fn covered(&self, column: i64, row: i64) -> u8 {
+        let inside =
+            column >= 0 && row >= 0 && column < i64::from(self.width) && row < i64::from(self.height);
+        let index = || row as usize * self.width as usize + column as usize;
+        if inside { self.coverage.get(index()).copied().unwrap_or(0) } else { 0 }
+    }
+
+    /// The player's mask on the pixels of the clip.
+    #[must_use]
+    pub fn mask(&self) -> Mask {
+        if !self.is_whole() || self.width == 0 || self.height == 0 {
+            return Mask::default();
+        }
+        let cells = DVec2::new(f64::from(self.width), f64::from(self.height));
+        let low = (self.pixel(DVec2::splat(-1.0))).floor();
+        let high = (self.pixel(cells)).ceil();
+        let (x0, y0) = (low.x as i32, low.y as i32);
+        let (width, height) = ((high.x - low.x) as u32 + 1, (high.y - low.y) as u32 + 1);
+        // Cells smaller than pixels are averaged.
+        let parts = (1.0 / self.cell_px).ceil().clamp(1.0, 8.0) as usize;
+        let share = |part: usize| (part as f64 + 0.5) / parts as f64 - 0.5;
+        let mut coverage = Vec::with_capacity(width as usize * height as usize);
+        for y in 0..height {
+            for x in 0..width {
+                let middle = low + DVec2::new(f64::from(x), f64::from(y));
+                let sum: f64 = (0..parts * parts)
+                    .map(|k| self.coverage_at(middle + DVec2::new(share(k % parts), share(k / parts))))
+                    .sum();
+                coverage.push((sum / (parts * parts) as f64).round() as u8);
+            }
+        }
+        Mask { x0, y0, width, height, coverage }
+    }
+
+    /// Coverage 0..255 between the middles of cells.
+    fn coverage_at(&self, pixel: DVec2) -> f64 {
+        let place = self.place(pixel);
+        let low = place.floor();
+        let t = place - low;
+        let (x, y) = (low.x as i64, low.y as i64);
+        let at = |dx: i64, dy: i64| f64::from(self.covered(x + dx, y + dy));
+        let rows = [0, 1].map(|dy| at(0, dy) * (1.0 - t.x) + at(1, dy) * t.x);
+        rows[0] * (1.0 - t.y) + rows[1] * t.y
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mask_covers_the_pixels_that_the_cells_cover() {
+        // Cells of half a pixel from pixel 10 on: 8 × 6 of them are pixels 10..14 by 20..23.
+        let map = DepthMap {
+            first_px: DVec2::new(9.75, 19.75),
+            cell_px: 0.5,
+            width: 8,
+            height: 6,
+            coverage: vec![255; 48],
+            front_mm: vec![0; 48],
+            back_mm: vec![0; 48],
+        };
+        let mask = map.mask();
+        let inside: Vec<(i32, i32)> = (15..28)
+            .flat_map(|y| (5..20).map(move |x| (x, y)))
+            .filter(|&(x, y)| mask.at(x, y) >= 128)
+            .collect();
+        let expected: Vec<(i32, i32)> = (20..23).flat_map(|y| (10..14).map(move |x| (x, y))).collect();
+        assert_eq!(inside, expected);
+        assert_eq!(mask.at(11, 21), 255);
+    }
+
+    #[test]
+    fn damaged_maps_are_known_and_empty() {
+        let map = DepthMap { width: u32::MAX, height: u32::MAX, cell_px: 1.0, ..DepthMap::default() };
+        assert!(!map.is_whole());
+        assert_eq!(map.mask(), Mask::default());
+        assert!(!DepthMap::default().is_whole(), "cells without a side");
+    }
+}

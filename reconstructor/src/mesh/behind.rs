@@ -1,0 +1,111 @@
+//! The colours of what the camera did not see: those of the same height of the body, without face and number, and at the outline those that
+//! are seen there, so that no seam shows.
+
+use image::{Rgb, RgbImage};
+
+use super::texture::CutOut;
+use crate::{
+    geometry::Mask,
+    pose::{Person, index},
+};
+
+/// Colours are averaged over this much to either side, metres: a number goes, a sleeve stays.
+const ACROSS_M: f64 = 0.12;
+/// And over this much up and down.
+const ALONG_M: f64 = 0.02;
+/// A shirt ends this far above the shoulders' joints, metres.
+const COLLAR_M: f64 = 0.08;
+/// From this far inside the outline on, all is guessed, metres.
+const BLEND_M: f64 = 0.06;
+/// The upper part of a head that shows hair from every side, of the way down to the neck.
+const HAIR: f64 = 0.3;
+
+/// A picture of the size of `seen` with the colours of the body's other side.
+pub(super) fn colours(seen: &CutOut, mask: &Mask, person: &Person, pixels_per_metre: f64) -> RgbImage {
+    let (width, height) = seen.image.dimensions();
+    let body = |x: u32, y: u32| mask.at(seen.x0 + x as i32, seen.y0 + y as i32) >= 128;
+    let reach = |metres: f64| ((metres * pixels_per_metre).round() as u32).clamp(1, 64);
+    let (across, along) = (reach(ACROSS_M), reach(ALONG_M).min(8));
+    let mean = |columns: std::ops::RangeInclusive<u32>, rows: std::ops::RangeInclusive<u32>| {
+        let (mut sum, mut count) = ([0u32; 3], 0u32);
+        for y in rows {
+            for x in columns.clone().filter(|&x| body(x, y)) {
+                if let Some(Rgb(colour)) = seen.image.get_pixel_checked(x, y) {
+                    sum = std::array::from_fn(|i| sum[i] + u32::from(colour[i]));
+                    count += 1;
+                }
+            }
+        }
+        (count > 0).then(|| Rgb(sum.map(|channel| (channel / count) as u8)))
+    };
+    let (right, bottom) = (width.saturating_sub(1), height.saturating_sub(1));
+    let mut guessed = RgbImage::from_fn(width, height, |x, y| {
+        let columns = x.saturating_sub(across)..=(x + across).min(right);
+        let rows = y.saturating_sub(along)..=(y + along).min(bottom);
+        mean(columns, rows).unwrap_or_else(|| *seen.image.get_pixel(x, y))
+    });
+    // Whoever shows his face shows hair on the other side, and the other way round: the top of the head is the better guess.
+    let top = (0..height).find(|&y| (0..width).any(|x| body(x, y)));
+    let nose = person.joints.get(index::NOSE).map(|nose| nose.pixel.y - f64::from(seen.y0));
+    if let (Some(top), Some(nose)) = (top, nose) {
+        // The nose is in the middle of the head; whoever is bent forward shows little of it above the shoulders.
+        let shoulders = [index::LEFT_SHOULDER, index::RIGHT_SHOULDER].into_iter();
+        let shoulders =
+            shoulders.filter_map(|joint| Some(person.joints.get(joint)?.pixel.y - f64::from(seen.y0)));
+        let collar = shoulders.fold(f64::INFINITY, f64::min) - COLLAR_M * pixels_per_metre;
+        let chin = (2.0 * nose - f64::from(top))
+            .min(collar)
+            .clamp(f64::from(top) + 1.0, f64::from(bottom).max(f64::from(top) + 1.0));
+        let hair = f64::from(top) + HAIR * (chin - f64::from(top));
+        if let Some(hair) = mean(0..=right, top..=(hair as u32).min(bottom)) {
+            for y in top..=(chin as u32).min(bottom) {
+                (0..width).for_each(|x| guessed.put_pixel(x, y, hair));
+            }
+        }
+    }
+    let inside = steps_inside(width, height, body);
+    let blend_px = (BLEND_M * pixels_per_metre).max(1.0) as f32;
+    for ((guess, Rgb(seen)), steps) in guessed.pixels_mut().zip(seen.image.pixels()).zip(inside) {
+        let share = (f32::from(steps) / blend_px).min(1.0);
+        let Rgb(guess) = guess;
+        for (guess, &seen) in guess.iter_mut().zip(seen) {
+            *guess = (f32::from(*guess) * share + f32::from(seen) * (1.0 - share)).round() as u8;
+        }
+    }
+    guessed
+}
+
+/// How many pixels each pixel is inside the outline, along rows and columns; 0 outside.
+fn steps_inside(width: u32, height: u32, body: impl Fn(u32, u32) -> bool) -> Vec<u16> {
+    let (columns, rows) = (width as usize, height as usize);
+    let mut steps: Vec<u16> = (0..rows * columns)
+        .map(|i| if body((i % columns) as u32, (i / columns) as u32) { u16::MAX - 1 } else { 0 })
+        .collect();
+    for backwards in [false, true] {
+        for k in 0..rows * columns {
+            let i = if backwards { rows * columns - 1 - k } else { k };
+            let (x, y) = (i % columns, i / columns);
+            let beside = if backwards { (x + 1 < columns).then_some(i + 1) } else { (x > 0).then(|| i - 1) };
+            let over =
+                if backwards { (y + 1 < rows).then_some(i + columns) } else { (y > 0).then(|| i - columns) };
+            // Beyond the picture is outside.
+            let nearest =
+                [beside, over].map(|at| at.map_or(0, |at| steps[at])).into_iter().min().unwrap_or(0);
+            steps[i] = steps[i].min(nearest + 1);
+        }
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_count_from_the_nearest_outline() {
+        let steps = steps_inside(7, 5, |x, y| (1..6).contains(&x) && y < 4);
+        assert_eq!(steps[..7], [0, 1, 1, 1, 1, 1, 0]);
+        assert_eq!(steps[7..14], [0, 1, 2, 2, 2, 1, 0]);
+        assert_eq!(steps[28..], [0; 7]);
+    }
+}

@@ -1,0 +1,58 @@
+//! Which triangles the camera saw, and where in the texture each vertex finds its colour.
+
+use glam::{DVec2, DVec3};
+
+use super::{VirtualPlane, pieces::Surface, texture::CutOut};
+use crate::depth::DepthMap;
+
+/// What lies this far behind the first surface is hidden by it, metres.
+const BEHIND_M: f64 = 0.09;
+
+/// A surface whose seen and guessed parts share no vertex.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Charts {
+    /// Index of the surface's point that each vertex lies on.
+    pub(super) points: Vec<u32>,
+    /// Into the texture: the seen picture in its left half, the guessed one in its right.
+    pub(super) uvs: Vec<[f32; 2]>,
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
+/// Splits a surface where what is seen ends. A triangle is seen that faces the camera and is not behind another part of the body.
+pub(super) fn split(surface: &Surface, depth: &DepthMap, plane: &VirtualPlane, seen: &CutOut) -> Charts {
+    let places: Vec<Option<(DVec2, f64)>> =
+        surface.points_m.iter().map(|&point| plane.offset(point)).collect();
+    let mut vertices = vec![[u32::MAX; 2]; surface.points_m.len()];
+    let mut charts = Charts::default();
+    for triangle in &surface.triangles {
+        let corners = triangle.map(|index| surface.points_m.get(index as usize).copied().unwrap_or_default());
+        let guessed = usize::from(!is_seen(corners, depth, plane));
+        let indices = triangle.map(|index| {
+            let place = &mut vertices[index as usize][guessed];
+            if *place == u32::MAX {
+                *place = charts.points.len() as u32;
+                charts.points.push(index);
+                let pixel = places[index as usize].map_or(DVec2::ZERO, |(pixel, _)| pixel);
+                let [u, v] = seen.uv(pixel);
+                charts.uvs.push([(u + guessed as f32) / 2.0, v]);
+            }
+            *place
+        });
+        charts.triangles.push(indices);
+    }
+    charts
+}
+
+fn is_seen([a, b, c]: [DVec3; 3], depth: &DepthMap, plane: &VirtualPlane) -> bool {
+    let middle = (a + b + c) / 3.0;
+    if (b - a).cross(c - a).dot(plane.camera.position - middle) <= 0.0 {
+        return false;
+    }
+    let Some((pixel, offset_m)) = plane.offset(middle) else { return false };
+    let cell = depth.place(pixel).round();
+    let inside = depth.covered(cell.x as i64, cell.y as i64) >= 128;
+    let index = || cell.y as usize * depth.width as usize + cell.x as usize;
+    let front_m = inside.then(|| depth.front_mm.get(index())).flatten().map(|&mm| f64::from(mm) / 1000.0);
+    // At the outline there may be no cell of the body under the middle: then nothing of it is before the triangle.
+    front_m.is_none_or(|front_m| offset_m <= front_m + BEHIND_M)
+}
