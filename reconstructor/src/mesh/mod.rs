@@ -66,7 +66,7 @@ pub struct MeshBudget {
 
 impl Default for MeshBudget {
     fn default() -> Self {
-        Self { triangles: 1_200 }
+        Self { triangles: 1_000 }
     }
 }
 
