@@ -21,7 +21,7 @@ from network import DepthNetwork, read_out
 from prepare import ARRAYS, POSE_STEP
 from window import GRID, PICTURE_SIZE
 
-BATCH = 16
+BATCH = 24
 WEIGHT_DECAY = 0.02
 DISTANCE_WEIGHT = 3.0  # of errors in metres beside the masks' cross entropy
 SQUARE_M = 0.1  # errors beyond this count by their square: where front and back cannot be told, the middle is best

@@ -7,6 +7,8 @@ use crate::geometry::Mask;
 
 /// Most cells of a map: the network's output is far smaller, a damaged map does not fill the memory.
 const MOST_CELLS: u64 = 1 << 20;
+/// Coverage from which a cell is inside.
+const INSIDE: u8 = 128;
 
 /// Depth of one player, first and last surface, over square cells of the clip's picture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -60,6 +62,17 @@ impl DepthMap {
             column >= 0 && row >= 0 && column < i64::from(self.width) && row < i64::from(self.height);
         let index = || row as usize * self.width as usize + column as usize;
         if inside { self.coverage.get(index()).copied().unwrap_or(0) } else { 0 }
+    }
+
+    /// First and last surface in a cell that is the player's more than not, metres from the upright plane.
+    #[must_use]
+    pub fn surfaces_m(&self, column: i64, row: i64) -> Option<[f64; 2]> {
+        if self.covered(column, row) < INSIDE {
+            return None;
+        }
+        let cell = row as usize * self.width as usize + column as usize;
+        let metres = |plane: &[i16]| plane.get(cell).map(|&mm| f64::from(mm) / 1000.0);
+        Some([metres(&self.front_mm)?, metres(&self.back_mm)?])
     }
 
     /// The player's mask on the pixels of the clip.

@@ -18,8 +18,8 @@ use crate::{
 };
 
 pub use map::DepthMap;
-pub(crate) use paint::LIMBS;
 pub use paint::View;
+pub(crate) use paint::{LIMBS, with_middles};
 pub use surface::WindowSurface;
 pub use window::Window;
 

@@ -78,7 +78,10 @@ struct Node {
 ///
 /// `None` unless there are [`JOINTS`] joints.
 pub(super) fn paint(joints: &[Joint], window: &Window, view: View) -> Option<Vec<f32>> {
-    let nodes = nodes(joints, view.pixels_per_metre)?;
+    let nodes: Vec<Node> = with_middles(joints)?
+        .iter()
+        .map(|j| Node { at_m: j.pixel / view.pixels_per_metre, depth_m: f64::from(j.depth_m) })
+        .collect();
     let pelvis_y_m = nodes.get(PELVIS)?.at_m.y;
     let limbs = LIMBS
         .iter()
@@ -105,19 +108,22 @@ pub(super) fn paint(joints: &[Joint], window: &Window, view: View) -> Option<Vec
     Some(presence)
 }
 
-fn nodes(joints: &[Joint], pixels_per_metre: f64) -> Option<Vec<Node>> {
+/// The joints and after them the middles of the shoulders and of the hips, which [`LIMBS`] names too. `None` unless there are
+/// [`JOINTS`] joints.
+pub(crate) fn with_middles(joints: &[Joint]) -> Option<Vec<Joint>> {
     if joints.len() != JOINTS {
         return None;
     }
-    let mut nodes: Vec<Node> = joints
-        .iter()
-        .map(|j| Node { at_m: j.pixel / pixels_per_metre, depth_m: f64::from(j.depth_m) })
-        .collect();
+    let mut all = joints.to_vec();
     for (a, b) in [(11, 12), (23, 24)] {
-        let (a, b): (&Node, &Node) = (nodes.get(a)?, nodes.get(b)?);
-        nodes.push(Node { at_m: (a.at_m + b.at_m) / 2.0, depth_m: (a.depth_m + b.depth_m) / 2.0 });
+        let (a, b): (&Joint, &Joint) = (joints.get(a)?, joints.get(b)?);
+        all.push(Joint {
+            pixel: (a.pixel + b.pixel) / 2.0,
+            depth_m: (a.depth_m + b.depth_m) / 2.0,
+            visibility: a.visibility.min(b.visibility),
+        });
     }
-    Some(nodes)
+    Some(all)
 }
 
 /// A limb over the window.

@@ -44,18 +44,6 @@ impl WindowSurface {
         self.window
     }
 
-    /// Probability that a pixel of the clip shows the player; 0 outside the window.
-    #[must_use]
-    pub fn presence_at(&self, pixel: DVec2) -> f64 {
-        self.inside(pixel, SEEN)
-    }
-
-    /// Probability that a pixel of the clip is the player's, hidden by others or not; 0 outside the window.
-    #[must_use]
-    pub fn body_at(&self, pixel: DVec2) -> f64 {
-        self.inside(pixel, BODY)
-    }
-
     /// Metres from the upright plane to the body's first and last surface at a pixel of the clip, positive away.
     ///
     /// Bilinear over the cells that belong to the player, each as much as it does, so that the background next to an
@@ -114,15 +102,6 @@ impl WindowSurface {
             map.back_mm.push(back.max(front));
         }
         map
-    }
-
-    fn inside(&self, pixel: DVec2, plane: usize) -> f64 {
-        let place = self.window.place(pixel, PICTURE_SIZE);
-        let last = PICTURE_SIZE as f64 - 0.5;
-        if place.cmplt(DVec2::splat(-0.5)).any() || place.cmpgt(DVec2::splat(last)).any() {
-            return 0.0;
-        }
-        corners(place).iter().map(|&(cell, share)| share * self.value(plane, cell)).sum()
     }
 
     /// A plane's value in a cell; 0 outside.
@@ -191,10 +170,8 @@ mod tests {
     #[test]
     fn the_outline_does_not_bend_towards_the_background() {
         let surface = half();
-        assert!((surface.presence_at(DVec2::new(63.25, 10.0)) - 0.75).abs() < 1e-9);
         let [front, back] = surface.offsets_at(DVec2::new(63.75, 10.0));
         assert!((front - 0.3).abs() < 1e-6 && (back - 0.5).abs() < 1e-6);
-        assert_eq!(surface.presence_at(DVec2::new(-1.0, 10.0)), 0.0);
     }
 
     #[test]
@@ -214,7 +191,7 @@ mod tests {
         let window = Window { centre_px: DVec2::ZERO, side_px: 64.0 };
         let planes = [0, 1, 2, 3, 4, 5].map(|k| vec![if k % 2 == 0 { f32::NAN } else { f32::INFINITY }; 3]);
         let surface = WindowSurface::new(window, planes);
-        assert_eq!(surface.presence_at(DVec2::ZERO), 0.0);
+        assert_eq!(surface.value(SEEN, 0), 0.0);
         assert_eq!(surface.offsets_at(DVec2::splat(1e12)), [0.0, 0.0]);
         assert_eq!(
             surface.on_mask(&Mask { width: 5, height: 1, coverage: vec![255; 5], ..Mask::default() }).width,

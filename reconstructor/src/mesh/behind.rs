@@ -1,7 +1,8 @@
 //! The colours of what the camera did not see: those of the same height of the body, without face and number, and at the outline those that
 //! are seen there, so that no seam shows.
 
-use image::{Rgb, RgbImage};
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use imageproc::distance_transform::{Norm, distance_transform};
 
 use super::texture::CutOut;
 use crate::{
@@ -63,49 +64,15 @@ pub(super) fn colours(seen: &CutOut, mask: &Mask, person: &Person, pixels_per_me
             }
         }
     }
-    let inside = steps_inside(width, height, body);
+    let outside = GrayImage::from_fn(width, height, |x, y| Luma([if body(x, y) { 0 } else { u8::MAX }]));
+    let inside_px = distance_transform(&outside, Norm::L1);
     let blend_px = (BLEND_M * pixels_per_metre).max(1.0) as f32;
-    for ((guess, Rgb(seen)), steps) in guessed.pixels_mut().zip(seen.image.pixels()).zip(inside) {
-        let share = (f32::from(steps) / blend_px).min(1.0);
+    for ((guess, Rgb(seen)), steps) in guessed.pixels_mut().zip(seen.image.pixels()).zip(inside_px.pixels()) {
+        let share = (f32::from(steps.0[0]) / blend_px).min(1.0);
         let Rgb(guess) = guess;
         for (guess, &seen) in guess.iter_mut().zip(seen) {
             *guess = (f32::from(*guess) * share + f32::from(seen) * (1.0 - share)).round() as u8;
         }
     }
     guessed
-}
-
-/// How many pixels each pixel is inside the outline, along rows and columns; 0 outside.
-fn steps_inside(width: u32, height: u32, body: impl Fn(u32, u32) -> bool) -> Vec<u16> {
-    let (columns, rows) = (width as usize, height as usize);
-    let mut steps: Vec<u16> = (0..rows * columns)
-        .map(|i| if body((i % columns) as u32, (i / columns) as u32) { u16::MAX - 1 } else { 0 })
-        .collect();
-    for backwards in [false, true] {
-        for k in 0..rows * columns {
-            let i = if backwards { rows * columns - 1 - k } else { k };
-            let (x, y) = (i % columns, i / columns);
-            let beside = if backwards { (x + 1 < columns).then_some(i + 1) } else { (x > 0).then(|| i - 1) };
-            let over =
-                if backwards { (y + 1 < rows).then_some(i + columns) } else { (y > 0).then(|| i - columns) };
-            // Beyond the picture is outside.
-            let nearest =
-                [beside, over].map(|at| at.map_or(0, |at| steps[at])).into_iter().min().unwrap_or(0);
-            steps[i] = steps[i].min(nearest + 1);
-        }
-    }
-    steps
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn steps_count_from_the_nearest_outline() {
-        let steps = steps_inside(7, 5, |x, y| (1..6).contains(&x) && y < 4);
-        assert_eq!(steps[..7], [0, 1, 1, 1, 1, 1, 0]);
-        assert_eq!(steps[7..14], [0, 1, 2, 2, 2, 1, 0]);
-        assert_eq!(steps[28..], [0; 7]);
-    }
 }

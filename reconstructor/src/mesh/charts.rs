@@ -19,9 +19,14 @@ pub(super) struct Charts {
 }
 
 /// Splits a surface where what is seen ends. A triangle is seen that faces the camera and is not behind another part of the body.
-pub(super) fn split(surface: &Surface, depth: &DepthMap, plane: &VirtualPlane, seen: &CutOut) -> Charts {
-    let places: Vec<Option<(DVec2, f64)>> =
-        surface.points_m.iter().map(|&point| plane.offset(point)).collect();
+/// `pixels` are where its points are seen in the clip.
+pub(super) fn split(
+    surface: &Surface,
+    pixels: &[DVec2],
+    depth: &DepthMap,
+    plane: &VirtualPlane,
+    seen: &CutOut,
+) -> Charts {
     let mut vertices = vec![[u32::MAX; 2]; surface.points_m.len()];
     let mut charts = Charts::default();
     for triangle in &surface.triangles {
@@ -32,8 +37,7 @@ pub(super) fn split(surface: &Surface, depth: &DepthMap, plane: &VirtualPlane, s
             if *place == u32::MAX {
                 *place = charts.points.len() as u32;
                 charts.points.push(index);
-                let pixel = places[index as usize].map_or(DVec2::ZERO, |(pixel, _)| pixel);
-                let [u, v] = seen.uv(pixel);
+                let [u, v] = seen.uv(pixels[index as usize]);
                 charts.uvs.push([(u + guessed as f32) / 2.0, v]);
             }
             *place
@@ -50,9 +54,7 @@ fn is_seen([a, b, c]: [DVec3; 3], depth: &DepthMap, plane: &VirtualPlane) -> boo
     }
     let Some((pixel, offset_m)) = plane.offset(middle) else { return false };
     let cell = depth.place(pixel).round();
-    let inside = depth.covered(cell.x as i64, cell.y as i64) >= 128;
-    let index = || cell.y as usize * depth.width as usize + cell.x as usize;
-    let front_m = inside.then(|| depth.front_mm.get(index())).flatten().map(|&mm| f64::from(mm) / 1000.0);
+    let surfaces_m = depth.surfaces_m(cell.x as i64, cell.y as i64);
     // At the outline there may be no cell of the body under the middle: then nothing of it is before the triangle.
-    front_m.is_none_or(|front_m| offset_m <= front_m + BEHIND_M)
+    surfaces_m.is_none_or(|[front_m, _]| offset_m <= front_m + BEHIND_M)
 }

@@ -19,6 +19,7 @@ pub(super) fn to_budget(
     let simplified = simplify_decoder(&indices, &near, triangles * 3, 1.0, SimplifyOptions::None, None);
     // Topology can stop the collapses early; clustering never stops.
     let simplified = if simplified.len() > triangles * 3 {
+        tracing::debug!(triangles, "a body is simplified by clustering: it may not stay closed");
         simplify_sloppy_decoder(&indices, &near, triangles * 3, 1.0, None)
     } else {
         simplified

@@ -122,12 +122,6 @@ impl VirtualPlane {
         })
     }
 
-    /// Tangent of the angle at which the camera looks down on the anchor.
-    fn descent(&self) -> f64 {
-        let sight = self.anchor_m - self.camera.position;
-        -sight.y / sight.with_y(0.0).length().max(1e-6)
-    }
-
     /// Metres behind the plane along the optical axis, and the pixel, of a point of the world; `None` behind the camera.
     pub(crate) fn offset(&self, point_m: DVec3) -> Option<(DVec2, f64)> {
         let pixel = self.camera.project(point_m)?;
@@ -172,10 +166,11 @@ pub fn lift(
         contact::correction(&surface.points_m, person, &plane, footprint_m, figure.above_ground_m);
     surface.simplify(budget.triangles);
     let mask = depth.mask();
-    let pixels: Vec<DVec2> = surface.points_m.iter().filter_map(|point| camera.project(*point)).collect();
+    let pixels: Option<Vec<DVec2>> = surface.points_m.iter().map(|point| camera.project(*point)).collect();
+    let pixels = pixels.ok_or(MeshError::NoPlane)?;
     let seen = texture::cut_out(image, &mask, &pixels);
     let guessed = behind::colours(&seen, &mask, person, 1.0 / footprint_m);
-    let charts = charts::split(&surface, depth, &plane, &seen);
+    let charts = charts::split(&surface, &pixels, depth, &plane, &seen);
     let positions_m = charts
         .points
         .iter()

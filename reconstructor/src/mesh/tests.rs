@@ -166,7 +166,7 @@ fn a_sphere_keeps_its_shape_under_a_budget() {
         let mut errors: Vec<f64> =
             world(&surface).iter().map(|p| (p.distance(centre) - radius_m).abs()).collect();
         errors.sort_by(f64::total_cmp);
-        assert!(errors[errors.len() * 8 / 10] < 0.015, "80 % within {}", errors[errors.len() * 8 / 10]);
+        assert!(errors[errors.len() * 8 / 10] < 0.01, "80 % within {}", errors[errors.len() * 8 / 10]);
     }
 }
 
@@ -192,14 +192,19 @@ fn triangles_face_outwards_and_the_texture_shows_no_grass() {
     let (mut facing, mut shown, mut wrong) = (0, 0, 0);
     for triangle in &surface.mesh.triangles {
         let [a, b, c] = corners(triangle);
-        let faces = (b - a).cross(c - a).dot(camera.position - a) > 0.0;
+        let normal = (b - a).cross(c - a);
+        let facing_by = normal.normalize_or_zero().dot((camera.position - a).normalize());
+        // Corners of one pixel column lie in one plane with the camera: such triangles have no side.
+        if facing_by.abs() < 1e-4 {
+            continue;
+        }
+        let faces = facing_by > 0.0;
         let seen = triangle.iter().all(|&index| surface.mesh.uvs[index as usize][0] <= 0.5);
         wrong += usize::from(seen && !faces);
         facing += usize::from(faces);
         shown += usize::from(seen);
     }
-    // The body was set on the ground after they were chosen, so those seen edge-on may have turned.
-    assert!(wrong * 50 < shown, "{wrong} of {shown} seen triangles face away");
+    assert_eq!(wrong, 0, "of {shown} seen triangles");
     assert!(shown * 100 > facing * 97, "{shown} of {facing} triangles that face the camera are seen");
     for pixel in surface.texture.pixels() {
         assert_eq!(*pixel, RED);
@@ -237,7 +242,7 @@ fn texture_coordinates_point_at_the_pixel_a_vertex_was_seen_in() {
 }
 
 #[test]
-fn a_limb_before_the_body_stands_free() {
+fn what_is_far_before_the_body_stands_free_without_a_skeleton() {
     let camera = camera();
     let anchor_m = DVec3::new(10.0, 0.0, 8.0);
     let towards = (camera.position - anchor_m).with_y(0.0).normalize();

@@ -9,8 +9,8 @@ use glam::{DVec2, DVec3};
 
 use super::{MeshError, VirtualPlane};
 use crate::{
-    depth::{DepthMap, LIMBS},
-    pose::{Joint, Person, index},
+    depth::{DepthMap, LIMBS, View, with_middles},
+    pose::Person,
 };
 
 /// A ray that stays in the body for longer than this may have passed air, metres.
@@ -23,8 +23,6 @@ const SLAB_M: f64 = 0.02;
 const SLABS: usize = 96;
 /// Surfaces farther than this from the upright plane are cut, metres.
 const REACH_M: f64 = 1.6;
-/// Coverage from which a cell is inside.
-const INSIDE: u8 = 128;
 /// Balls that stand for a limb.
 const BALLS: usize = 6;
 /// Radius of what is no known limb, metres.
@@ -121,12 +119,7 @@ impl Rays {
         let (width, height) = (depth.width as usize + 2, depth.height as usize + 2);
         let mut rays = vec![Ray::default(); width * height];
         let own = |x: i64, y: i64| -> Option<[f64; 2]> {
-            if depth.covered(x, y) < INSIDE {
-                return None;
-            }
-            let cell = y as usize * depth.width as usize + x as usize;
-            let metres = |plane: &[i16]| plane.get(cell).map(|&mm| f64::from(mm) / 1000.0);
-            let (front, back) = (metres(&depth.front_mm)?, metres(&depth.back_mm)?);
+            let [front, back] = depth.surfaces_m(x, y)?;
             let inside = front.abs() <= REACH_M && back >= front;
             // The thinnest parts are still a slab thick, so that none is lost between samples.
             inside.then(|| [front, back.min(REACH_M).max(front + 1.5 * SLAB_M)])
@@ -176,22 +169,12 @@ struct Limbs {
 impl Limbs {
     /// The limbs of a person at the distances of the surfaces: joints know their depth only from the hips.
     fn new(person: &Person, plane: &VirtualPlane, depth: &DepthMap, rays: &Rays, footprint_m: f64) -> Self {
-        let mut joints: Vec<Joint> = person.joints.clone();
-        let middle = |a: usize, b: usize| -> Option<Joint> {
-            let (a, b) = (joints.get(a)?, joints.get(b)?);
-            Some(Joint {
-                pixel: (a.pixel + b.pixel) / 2.0,
-                depth_m: (a.depth_m + b.depth_m) / 2.0,
-                visibility: a.visibility.min(b.visibility),
-            })
-        };
-        let (Some(neck), Some(hips)) =
-            (middle(index::LEFT_SHOULDER, index::RIGHT_SHOULDER), middle(index::LEFT_HIP, index::RIGHT_HIP))
-        else {
+        let joints = with_middles(&person.joints);
+        let view = View::from_camera(&plane.camera, plane.anchor_m);
+        let (Some(joints), Some(view)) = (joints, view) else {
             return Self { balls: Vec::new(), footprint_m };
         };
-        joints.extend([neck, hips]);
-        let descent = plane.descent();
+        let hips_y_px = joints.last().map_or(0.0, |hips| hips.pixel.y);
         let mut balls = Vec::new();
         for &(from, to, radius_m) in &LIMBS {
             let (Some(from), Some(to)) = (joints.get(from), joints.get(to)) else { continue };
@@ -199,7 +182,7 @@ impl Limbs {
                 let share = k as f64 / (BALLS - 1) as f64;
                 let pixel = from.pixel.lerp(to.pixel, share);
                 let behind_hips_m = f64::from(from.depth_m) * (1.0 - share) + f64::from(to.depth_m) * share;
-                let slope_m = (pixel.y - hips.pixel.y) * footprint_m * descent;
+                let slope_m = (pixel.y - hips_y_px) * footprint_m * view.descent;
                 Ball { pixel, offset_m: behind_hips_m - slope_m, radius_m }
             }));
         }
