@@ -13,7 +13,7 @@ use wgpu::{
 use crate::{
     ar::RoomPicture,
     camera::{EyeView, ViewCamera},
-    renderer::{Canvas, InRoom, OnTable, PictureFormat, RealTable, Renderer, Target},
+    renderer::{Canvas, Guessed, InRoom, OnTable, PictureFormat, RealTable, Renderer, Target},
     scene::{FrameScene, Stage},
 };
 
@@ -113,10 +113,23 @@ impl Offscreen {
         stage: &Stage,
         frame: &FrameScene,
         camera: &ViewCamera,
+        size_px: (u32, u32),
+    ) -> Result<RgbaImage, OffscreenError> {
+        self.picture_with(stage, frame, camera, Guessed::Solid, size_px)
+    }
+
+    /// The same, with what no camera saw drawn in another way.
+    pub fn picture_with(
+        &self,
+        stage: &Stage,
+        frame: &FrameScene,
+        camera: &ViewCamera,
+        guessed: Guessed,
         (width_px, height_px): (u32, u32),
     ) -> Result<RgbaImage, OffscreenError> {
         let target = self.target(width_px, height_px)?;
         let mut renderer = Renderer::new(&self.device, &self.queue, stage);
+        renderer.show_guessed(guessed);
         renderer.upload(&self.device, &self.queue, frame);
         self.draw(&renderer, &target, camera)?;
         self.read_back(&target)

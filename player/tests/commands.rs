@@ -120,6 +120,21 @@ fn a_manifest_that_is_cut_short_is_named() {
 }
 
 #[test]
+fn a_turntable_needs_somebody_who_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    support::write_match(folder.path(), 35);
+    let stream = folder.path().to_str().unwrap();
+    let out = folder.path().join("a.png");
+    let common = ["render", stream, "--frame", "3", "--size", "48x64", "--out", out.to_str().unwrap()];
+    let output = player(&[&common[..], &["--turntable", "4", "--person", "77"]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    assert!(error_line(&output).contains("person 77 is not in this frame: it has 0, 1, 2, 3, 4, 5"));
+    for wrong in [&["--turntable", "4"][..], &["--person", "1"], &["--camera", "top", "--guessed", "maybe"]] {
+        assert_eq!(player(&[&common[..], wrong].concat()).status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
 fn frames_beyond_the_end_are_refused_with_the_range() {
     let folder = tempfile::tempdir().unwrap();
     support::write_match(folder.path(), 35);

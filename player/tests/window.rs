@@ -12,6 +12,7 @@ use player::{
     app::{PlayerApp, Room},
     ar::synthetic::SyntheticRoom,
     placement::TabletopPose,
+    renderer::Guessed,
     session::Session,
     source::{Location, loader::Loader},
 };
@@ -115,6 +116,23 @@ fn the_keyboard_plays_steps_and_jumps() {
     wait_for_frame(&mut harness, 0);
     harness.key_press(egui::Key::Space);
     wait_for(&mut harness, "Pause", |harness| harness.query_by_label("Pause").is_some());
+}
+
+#[test]
+fn guessed_surfaces_are_chosen_by_menu_and_by_key() {
+    let (_folder, mut harness) = sample_window();
+    let chosen = |harness: &Harness<'static, PlayerApp>| harness.state().guessed();
+    assert_eq!(chosen(&harness), Guessed::Solid);
+    harness.get_by_label("Guessed surfaces").click();
+    harness.run_steps(3);
+    harness.get_by_label("Guessed: hidden").click();
+    harness.run_steps(3);
+    assert_eq!(chosen(&harness), Guessed::Hidden);
+    for next in [Guessed::Solid, Guessed::Ghosted] {
+        harness.key_press(egui::Key::G);
+        harness.run_steps(2);
+        assert_eq!(chosen(&harness), next);
+    }
 }
 
 #[test]

@@ -92,6 +92,7 @@ pub fn frame_of(frame: u32, people: u32) -> ChunkFrame {
                 person: PersonId(person),
                 anchor_m: anchor_of(frame, person),
                 mesh: mesh_of(frame, person, people),
+                guessed_from_u: None,
             })
             .collect(),
     }

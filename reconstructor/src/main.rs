@@ -19,7 +19,7 @@ use reconstructor::{
         command::{self, CalibrateOptions},
     },
     encode::read_stream,
-    evaluate::{self, air, depth, frame_truth, matches},
+    evaluate::{self, air, depth, flicker, frame_truth, matches},
     mesh::MeshBudget,
     pipeline::{ObserveOptions, ReconstructOptions, reconstruct},
     report::{Progress, Reporter},
@@ -244,19 +244,21 @@ struct AllFigures {
     #[serde(flatten)]
     people: matches::MatchFigures,
     #[serde(flatten)]
+    flicker: flicker::FlickerFigures,
+    #[serde(flatten)]
     air: Option<air::AirFigures>,
 }
 
 fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
     let limits = Limits::default();
     let truth = arguments.data.join("truth");
-    let frames = |folder: &Path| -> Result<Vec<_>> {
-        let (_, chunks) = read_stream(folder, &limits)?;
-        Ok(chunks.into_iter().flat_map(|chunk| chunk.frames).collect())
+    let frames = |folder: &Path| -> Result<(_, Vec<_>)> {
+        let (manifest, chunks) = read_stream(folder, &limits)?;
+        Ok((manifest.timescale, chunks.into_iter().flat_map(|chunk| chunk.frames).collect()))
     };
-    let truth = frames(&truth)
+    let (timescale, truth) = frames(&truth)
         .context("the true stream cannot be read; --data names the folder that holds truth/")?;
-    let ours = frames(&arguments.stream).context("the reconstructed stream cannot be read")?;
+    let (_, ours) = frames(&arguments.stream).context("the reconstructed stream cannot be read")?;
     let frames = arguments.data.join(frame_truth::FILE_NAME);
     let air = if frames.exists() {
         Some(air::compare(&frame_truth::frames::<air::FrameLine>(&arguments.data)?, &truth, &ours))
@@ -264,7 +266,8 @@ fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
         tracing::warn!("there is no {}, so ball and jumps are not measured", frames.display());
         None
     };
-    let figures = AllFigures { people: matches::compare(&truth, &ours), air };
+    let people = matches::compare(&truth, &ours);
+    let figures = AllFigures { people, flicker: flicker::flicker(&truth, &ours, timescale), air };
     write_figures(&arguments.json, &figures)
 }
 

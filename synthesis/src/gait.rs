@@ -313,6 +313,23 @@ pub fn draw<'a, 'b>(actions: &'b [Action<'a>], rng: &mut impl Rng) -> Option<&'b
     })
 }
 
+/// Two movements in one pose: the arms of one with the legs of the other, or something between both. So training players move in more ways
+/// than there are actions.
+#[must_use]
+pub fn mixed(first: &Pose, second: &Pose, rng: &mut impl Rng) -> Pose {
+    const ARMS: [Joint; 4] = [Joint::UpperArmR, Joint::LowerArmR, Joint::UpperArmL, Joint::LowerArmL];
+    // The trunk leans with the legs, or the player would not stand.
+    let (mut pose, arms_of) = match rng.random_range(0..3) {
+        0 => return first.blend(second, rng.random_range(0.25..0.75)),
+        1 => (*first, second),
+        _ => (*second, first),
+    };
+    for joint in ARMS {
+        *pose.joint(joint) = arms_of.rotations[joint as usize];
+    }
+    pose
+}
+
 /// Small random turns of every joint and sometimes the other side leading: no two players move alike.
 #[must_use]
 pub fn personal(pose: Pose, strength: f32, rng: &mut impl Rng) -> Pose {
@@ -340,4 +357,32 @@ pub fn personal(pose: Pose, strength: f32, rng: &mut impl Rng) -> Pose {
         *rotation *= bend;
     }
     pose
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64Mcg;
+
+    use super::*;
+
+    #[test]
+    fn who_does_two_things_has_limbs_of_both() {
+        let (run, throw) = (stride(&SPRINT, 0.1), acts::drawn(Kind::ThrowIn, 0.6));
+        let mut rng = Pcg64Mcg::seed_from_u64(4);
+        let same = |a: Quat, b: Quat| a.dot(b).abs() > 0.9999;
+        let mut whole = [0; 2];
+        for _ in 0..60 {
+            let pose = mixed(&run, &throw, &mut rng);
+            let from = |joint: Joint| {
+                let rotation = pose.rotations[joint as usize];
+                [&run, &throw].map(|one| same(rotation, one.rotations[joint as usize]))
+            };
+            let (leg, arm) = (from(Joint::ThighL), from(Joint::UpperArmR));
+            for (one, count) in whole.iter_mut().enumerate() {
+                *count += usize::from(leg[one] && arm[1 - one]);
+            }
+        }
+        assert!(whole.iter().all(|&count| count > 8) && whole.iter().sum::<usize>() < 55, "{whole:?}");
+    }
 }

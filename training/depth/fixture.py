@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from dataset import Rendered, view_of
+from lifting import JOINTS, TAUGHT, normal
 from seen import MODELS, Networks
 from window import PICTURE_SIZE, mask_box, paint, sample, window_of
 
@@ -45,6 +46,8 @@ def main():
     picture = (sample(np.dstack([image, mask]), centre, side, PICTURE_SIZE).transpose(2, 0, 1) / 255.0).astype(np.float32)
     pose = paint(joints, depth.astype(float), centre, side, pixels_per_metre, descent).astype(np.float32)
     planes = prepass.load(MODELS / "depth.onnx").run(None, {"picture": picture[None], "pose": pose[None]})
+    known = normal(joints[None], depth[None], np.ones((1, JOINTS)), centre[None], np.array([pixels_per_metre]))
+    lifted = prepass.load(MODELS / "lifting.onnx").run(None, {"picture": picture[None], "pose": pose[None], "joints": known})[0][0]
     inside = np.flatnonzero(planes[0].ravel() > 0.5)
     cells = np.concatenate([rng.choice(inside, OUTPUT_CELLS // 2, replace=False), rng.choice(PICTURE_SIZE**2, OUTPUT_CELLS // 2, replace=False)])
     pictures, poses = (rng.choice(a.size, INPUT_CELLS, replace=False) for a in (picture, pose))
@@ -63,6 +66,7 @@ def main():
         "window": [float(centre[0]), float(centre[1]), float(side)],
         "picture": values(picture, pictures),
         "pose": values(pose, poses),
+        "lifted": {str(joint): [round(float(v), 5) for v in lifted[joint]] for joint in TAUGHT},
         "planes": [values(plane, cells) for plane in planes],
     }
     (out / "vector.json").write_text(json.dumps(vector).replace("], ", "],\n "))

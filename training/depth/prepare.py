@@ -5,7 +5,8 @@
 Folder by folder; those packed before are kept, so it can run again while more are being rendered, and beside another of the same. The
 arrays cover a margin around the window, so that training can move it: `picture` (N, 144, 144, 4) u8; `pose` (N, 72, 72, 4) i8 in units of
 `POSE_STEP`; `front` and `back` (N, 144, 144) i16 in millimetres, `OUTSIDE` where there is no body; `seen` (N, 144, 144) u8, 1 where nobody
-stands before it.
+stands before it. For the lifting network and `repaint.py`: `joints` (N, 33, 4), pixels of the crop, metres behind the hips, visibility, as read;
+`truth` (N, 33, 3); `window` (N, 5): middle (x, y) and side of what the arrays cover, pixels per metre, tangent of the camera's descent.
 """
 
 import argparse
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dataset import OUTSIDE, Rendered, view_of
+from dataset import OUTSIDE, Rendered, rotation_of, view_of
 from seen import Networks
 from window import GRID, PICTURE_SIZE, mask_box, paint, window_of
 
@@ -26,6 +27,7 @@ PACKED_GRID = GRID + 2 * MARGIN
 PACKED_PICTURE = PACKED_GRID * (PICTURE_SIZE // GRID)
 POSE_STEP = 0.025
 ARRAYS = ("picture", "pose", "front", "back", "seen")
+JOINT_ARRAYS = ("joints", "truth", "window")
 
 
 def on_window(plane, centre, side, size):
@@ -39,6 +41,12 @@ def on_window(plane, centre, side, size):
 
 def millimetres(plane):
     return np.where(np.isfinite(plane), np.round(np.nan_to_num(plane) * 1000), OUTSIDE).astype(np.int16)
+
+
+def true_joints(sample):
+    """(33, 3): pixels of the crop, metres behind the hips."""
+    depth = np.array(sample.meta["joints_m"], float) @ rotation_of(sample.meta)[2]
+    return np.column_stack([sample.to_crop(sample.meta["joints_px"]), depth - (depth[23] + depth[24]) / 2])
 
 
 def pack(networks, sample, rng, jitter):
@@ -61,6 +69,9 @@ def pack(networks, sample, rng, jitter):
         millimetres(front),
         millimetres(back),
         np.isfinite(seen).astype(np.uint8),
+        np.column_stack([known.joints, known.depth, known.visibility]).astype(np.float32),
+        true_joints(sample).astype(np.float32),
+        np.array([*centre, wide, pixels_per_metre, descent], np.float32),
     )
 
 
@@ -75,7 +86,7 @@ def pack_folder(networks, folder, out, arguments):
         else:
             rows.append(packed)
     out.mkdir(parents=True, exist_ok=True)
-    for name, arrays in zip(ARRAYS, zip(*rows)):
+    for name, arrays in zip((*ARRAYS, *JOINT_ARRAYS), zip(*rows)):
         np.save(out / f"{name}.npy", np.stack(arrays))
     summary = {"samples": len(rows), "dropped": reasons, "seed": arguments.seed, "seconds": round(time.time() - began)}
     (out / "packed.json").write_text(json.dumps(summary))

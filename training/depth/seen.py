@@ -25,10 +25,11 @@ SHIFT_UNIT, SHIFT_MAX = 0.1, 0.25  # as reconstructor/src/pose/refine.rs
 
 
 class Seen(NamedTuple):
-    """Joints (33, 2) in pixels of the crop, their depth (33,) behind the hips in metres, mask u8 on the crop's pixels."""
+    """Joints (33, 2) in pixels of the crop, their depth (33,) behind the hips in metres, visibility (33,), mask u8 on the crop's pixels."""
 
     joints: np.ndarray
     depth: np.ndarray
+    visibility: np.ndarray
     mask: np.ndarray
 
 
@@ -51,7 +52,7 @@ class Networks:
         window = view.Window(person)
         stack = view.stack(sample.crop, person, [other for other in others if other.usable], window)
         mask = self.masks.run(None, {self.masks.get_inputs()[0].name: stack[None]})[0].reshape(view.ROWS, view.COLUMNS)
-        return Seen(look.joints, look.depth, on_crop(mask, window, sample.crop.shape[0]))
+        return Seen(look.joints, look.depth, look.visibility, on_crop(mask, window, sample.crop.shape[0]))
 
     def _look(self, crop, box, rng):
         box = np.array(box, float)

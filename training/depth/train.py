@@ -1,6 +1,6 @@
 """Trains the depth network on packed samples (`prepare.py`), logs the curve, keeps the running average of the weights.
 
-    python3 train.py --data PACKED/train --validation PACKED/validation --out RUN --minutes 60 [--without pose|mask]
+    python3 train.py --data PACKED/train --validation PACKED/validation --out RUN --minutes 60 [--pose read|true|none] [--mask true|none]
 """
 
 import json
@@ -17,6 +17,7 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this fold
 
 from common import average_in, batches, begin, curve_of, parser_of, rate_at, settle, with_average
 from dataset import OUTSIDE
+from hourglass import HourglassNetwork
 from network import DepthNetwork, read_out
 from prepare import ARRAYS, POSE_STEP
 from window import GRID, PICTURE_SIZE
@@ -30,10 +31,12 @@ AVERAGE = 0.998
 
 
 class Packed:
-    """Samples written by `prepare.py`; the arrays stay on disk. `without` empties an input: pose or mask."""
+    """Samples written by `prepare.py`; the arrays stay on disk. `pose` and `mask` say which of them is shown, see `main`; folders without it are left out."""
 
-    def __init__(self, folder, without=None):
-        self.folder, self.without = Path(folder), without
+    def __init__(self, folder, pose, mask):
+        self.folder, self.mask = Path(folder), mask
+        self.empty = pose == "none"
+        self.names = [{"lifted": "lifted", "true": "true"}.get(pose, "pose") if name == "pose" else name for name in ARRAYS]
         self.shards = {}
         self.places = []
         self.refresh()
@@ -44,8 +47,8 @@ class Packed:
         """Takes in the folders that were packed since."""
         for summary in sorted(self.folder.rglob("packed.json")):
             shard = summary.parent
-            if shard not in self.shards:
-                self.shards[shard] = [np.load(shard / f"{name}.npy", mmap_mode="r") for name in ARRAYS]
+            if shard not in self.shards and all((shard / f"{name}.npy").exists() for name in self.names):
+                self.shards[shard] = [np.load(shard / f"{name}.npy", mmap_mode="r") for name in self.names]
                 self.places += [(shard, row) for row in range(len(self.shards[shard][0]))]
 
     def __len__(self):
@@ -75,9 +78,11 @@ class Packed:
                 recolour(picture[row], rng)
         picture /= 255.0
         pose *= POSE_STEP
-        if self.without == "mask":
+        if self.mask == "none":
             picture[..., 3] = 0.0
-        if self.without == "pose":
+        if self.mask == "true":
+            picture[..., 3] = planes[2] > 0
+        if self.empty:
             pose[:] = 0.0
         front, back = (np.where(plane == OUTSIDE, np.nan, plane / np.float32(1000.0)).astype(np.float32) for plane in planes[:2])
         picture, pose = (torch.from_numpy(array).permute(0, 3, 1, 2) for array in (picture, pose))
@@ -130,12 +135,14 @@ def validate(network, data, limit):
 def main():
     parser = parser_of(__doc__, minutes=60.0, rate=2.0e-3)
     parser.add_argument("--validated", type=int, default=384, help="validation samples looked at for the curve")
-    parser.add_argument("--without", choices=("pose", "mask"), help="for the ablation: an empty input")
+    parser.add_argument("--pose", choices=("lifted", "read", "true", "none"), default="lifted", help="joints that are painted (`repaint.py`)")
+    parser.add_argument("--mask", choices=("estimated", "true", "none"), default="estimated")
+    parser.add_argument("--hourglass", action="store_true", help="the paper's kind of network instead of ours")
     arguments = parser.parse_args()
 
     rng, out = begin(arguments)
-    data, validation = Packed(arguments.data, arguments.without), Packed(arguments.validation, arguments.without)
-    network, average = with_average(DepthNetwork(), arguments.start)
+    data, validation = (Packed(folder, arguments.pose, arguments.mask) for folder in (arguments.data, arguments.validation))
+    network, average = with_average(HourglassNetwork() if arguments.hourglass else DepthNetwork(), arguments.start)
     optimizer = torch.optim.AdamW(network.parameters(), arguments.rate, betas=(0.9, 0.99), weight_decay=WEIGHT_DECAY)
     curve = curve_of(out, ["loss", "validation_rmse_m", "validation_back_rmse_m", "flat_plane_rmse_m", "validation_mask_iou"])
     supply = batches(data, BATCH, lambda: rng.permutation(len(data)), lambda indices: data.batch(indices, rng))
@@ -168,7 +175,7 @@ def main():
         seen += BATCH
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()
         average_in(average, network, steps, AVERAGE)
-    (out / "run.json").write_text(json.dumps({"samples_seen": seen, "training_samples": len(data), "minutes": arguments.minutes, "seed": arguments.seed, "without": arguments.without}))
+    (out / "run.json").write_text(json.dumps({"samples_seen": seen, "training_samples": len(data), "minutes": arguments.minutes, "seed": arguments.seed, "pose": arguments.pose, "mask": arguments.mask, "hourglass": arguments.hourglass}))
 
 
 if __name__ == "__main__":

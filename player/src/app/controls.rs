@@ -10,6 +10,7 @@ use super::Look;
 use crate::{
     camera::Preset,
     placement::gesture::Event,
+    renderer::Guessed,
     session::Session,
     timeline::{SPEEDS_PERCENT, Timeline, speed_label},
 };
@@ -59,8 +60,13 @@ fn slider(ui: &mut Ui, frame: &mut u32, last: u32) -> Response {
     response
 }
 
-/// Play, step, speed, camera (in a recorded room there is only one) and where we are.
-pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: Option<&mut Look>, now: Duration) {
+/// Play, step, speed, camera and guessed surfaces (in a recorded room there is one camera, and all is solid), and where we are.
+pub(super) fn buttons(
+    ui: &mut Ui,
+    session: &mut Session,
+    look: Option<(&mut Look, &mut Guessed)>,
+    now: Duration,
+) {
     ui.horizontal(|ui| {
         let ready = session.timeline().is_some();
         let playing = session.is_playing();
@@ -82,8 +88,9 @@ pub(super) fn buttons(ui: &mut Ui, session: &mut Session, look: Option<&mut Look
         }
         ui.add_space(8.0);
         speed_menu(ui, session, now);
-        if let Some(look) = look {
+        if let Some((look, guessed)) = look {
             camera_menu(ui, look);
+            guessed_menu(ui, guessed);
         }
         ui.add_space(8.0);
         ui.label(position(session));
@@ -151,6 +158,24 @@ fn camera_menu(ui: &mut Ui, look: &mut Look) {
         }
     });
     name_menu(&menu.response, "Camera", current);
+}
+
+/// What no camera saw of people: as if it had been seen, pale, or not at all.
+fn guessed_menu(ui: &mut Ui, guessed: &mut Guessed) {
+    let label = |guessed: Guessed| match guessed {
+        Guessed::Solid => "Guessed: solid",
+        Guessed::Ghosted => "Guessed: ghosted",
+        Guessed::Hidden => "Guessed: hidden",
+    };
+    let current = label(*guessed);
+    let menu = ComboBox::from_id_salt("guessed").width(128.0).selected_text(current).show_ui(ui, |ui| {
+        for choice in Guessed::ALL {
+            if ui.selectable_label(*guessed == choice, label(choice)).clicked() {
+                *guessed = choice;
+            }
+        }
+    });
+    name_menu(&menu.response, "Guessed surfaces", guessed.name());
 }
 
 fn name_menu(response: &Response, name: &str, value: &str) {

@@ -17,6 +17,7 @@ use protocol::pitch::Pitch;
 use crate::{
     camera::{OrbitCamera, Preset},
     placement::gesture::Placement,
+    renderer::Guessed,
     session::Session,
     source::Location,
 };
@@ -39,6 +40,7 @@ pub struct PlayerApp {
     session: Session,
     view: Option<SceneView>,
     look: Look,
+    guessed: Guessed,
     room: Option<RoomView>,
     started: Instant,
 }
@@ -53,6 +55,7 @@ impl PlayerApp {
             session,
             view: context.wgpu_render_state.clone().map(SceneView::new),
             look: Look::Preset(Preset::Table),
+            guessed: Guessed::default(),
             room: None,
             started: Instant::now(),
         }
@@ -76,6 +79,12 @@ impl PlayerApp {
     #[must_use]
     pub fn session(&self) -> &Session {
         &self.session
+    }
+
+    /// How surfaces that no camera saw are shown.
+    #[must_use]
+    pub fn guessed(&self) -> Guessed {
+        self.guessed
     }
 
     /// Plays, if it does not already.
@@ -123,7 +132,7 @@ impl PlayerApp {
 impl eframe::App for PlayerApp {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         let now = self.now();
-        keyboard::apply(ui, &mut self.session, now);
+        keyboard::apply(ui, &mut self.session, &mut self.guessed, now);
         let changed = self.session.update(now);
         if let (true, Some(shown)) = (changed, self.session.shown()) {
             if let Some(room) = &mut self.room {
@@ -135,7 +144,7 @@ impl eframe::App for PlayerApp {
         Panel::bottom("controls").show(ui, |ui| {
             ui.add_space(6.0);
             controls::timeline(ui, &mut self.session, now);
-            let look = self.room.is_none().then_some(&mut self.look);
+            let look = self.room.is_none().then_some((&mut self.look, &mut self.guessed));
             controls::buttons(ui, &mut self.session, look, now);
             if let Some(room) = &mut self.room {
                 ui.horizontal(|ui| {
@@ -159,7 +168,7 @@ impl eframe::App for PlayerApp {
             }
             Some(view) => {
                 let camera = self.session.shown().and_then(|shown| shown.scene.camera);
-                view.ui(ui, &pitch, camera.as_ref(), &mut self.look);
+                view.ui(ui, &pitch, camera.as_ref(), &mut self.look, self.guessed);
             }
             None => {
                 ui.centered_and_justified(|ui| {

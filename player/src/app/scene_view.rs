@@ -8,7 +8,7 @@ use protocol::{camera::Camera, pitch::Pitch};
 use super::Look;
 use crate::{
     camera::{OrbitCamera, Preset, ViewCamera},
-    renderer::{Renderer, Target},
+    renderer::{Guessed, Renderer, Target},
     scene::{FrameScene, Stage},
 };
 
@@ -21,7 +21,8 @@ pub(super) struct SceneView {
     stage: Option<(Pitch, Renderer)>,
     frame: Option<std::sync::Arc<FrameScene>>,
     picture: Option<(Target, TextureId)>,
-    drawn: Option<ViewCamera>,
+    /// What the picture shows already.
+    drawn: Option<(ViewCamera, Guessed)>,
 }
 
 impl SceneView {
@@ -39,7 +40,14 @@ impl SceneView {
     }
 
     /// Fills the space that is left and follows the mouse.
-    pub(super) fn ui(&mut self, ui: &mut Ui, pitch: &Pitch, broadcast: Option<&Camera>, look: &mut Look) {
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        pitch: &Pitch,
+        broadcast: Option<&Camera>,
+        look: &mut Look,
+        guessed: Guessed,
+    ) {
         let size = ui.available_size().max(Vec2::splat(1.0));
         let aspect = f64::from(size.x / size.y);
         let pixels = size * ui.pixels_per_point();
@@ -72,7 +80,7 @@ impl SceneView {
             camera = orbit.view(aspect);
             *look = Look::Orbit(orbit);
         }
-        self.draw(pitch, &camera);
+        self.draw(pitch, &camera, guessed);
     }
 
     /// The texture of the wanted size; a new one when the window changed.
@@ -103,7 +111,7 @@ impl SceneView {
     }
 
     /// Draws unless the picture is already this one.
-    fn draw(&mut self, pitch: &Pitch, camera: &ViewCamera) {
+    fn draw(&mut self, pitch: &Pitch, camera: &ViewCamera, guessed: Guessed) {
         let (device, queue) = (&self.graphics.device, &self.graphics.queue);
         if self.stage.as_ref().is_none_or(|(built, _)| built != pitch) {
             let mut renderer = Renderer::new(device, queue, &Stage::new(*pitch));
@@ -113,14 +121,15 @@ impl SceneView {
             self.stage = Some((*pitch, renderer));
             self.drawn = None;
         }
-        if self.drawn.as_ref() == Some(camera) {
+        if self.drawn == Some((*camera, guessed)) {
             return;
         }
-        if let (Some((_, renderer)), Some((target, _))) = (&self.stage, &self.picture) {
+        if let (Some((_, renderer)), Some((target, _))) = (&mut self.stage, &self.picture) {
+            renderer.show_guessed(guessed);
             let mut encoder = device.create_command_encoder(&Default::default());
             renderer.draw(queue, &mut encoder, target, camera);
             queue.submit([encoder.finish()]);
-            self.drawn = Some(*camera);
+            self.drawn = Some((*camera, guessed));
         }
     }
 }

@@ -7,11 +7,13 @@ mod eye;
 mod file;
 mod orbit;
 mod preset;
+mod turntable;
 
 pub use eye::EyeView;
 pub use file::{CameraFile, CameraFileError};
 pub use orbit::OrbitCamera;
 pub use preset::{NoSuchPreset, Preset};
+pub use turntable::turntable;
 
 use glam::{DMat3, DVec2, DVec3, Mat4, Vec4};
 use protocol::camera::Camera;

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
+use image::{RgbaImage, imageops};
 use player::{
-    camera::{CameraFile, Preset, ViewCamera},
+    camera::{CameraFile, Preset, ViewCamera, turntable},
     offscreen::Offscreen,
+    renderer::Guessed,
     scene::{FrameScene, Stage},
     source::Stream,
 };
@@ -16,6 +18,7 @@ const EXAMPLES: &str = "Examples:
   player render target/demo/stream --frame 60 --camera top --size 1280x720 --out top.png
   player render http://localhost:8080/ --frame 0 --camera goal-left --size 960x540 --out goal.png
   player render target/demo/stream --frame 0 --camera my-camera.json --size 960x540 --out mine.png
+  player render target/demo/stream --frame 40 --turntable 8 --person 3 --size 320x400 --out round.png
 
 A camera file holds {\"position_m\": [0, 25, 80], \"target_m\": [10, 0, 0], \"vertical_fov_degrees\": 30}
 (world metres, y up, z towards the main camera) or a pinhole camera as the stream has it.
@@ -30,8 +33,17 @@ pub(super) struct RenderArguments {
     #[arg(long)]
     frame: u32,
     /// table, broadcast, top, goal-left, goal-right, or a JSON file.
-    #[arg(long, value_name = "NAME|FILE", value_parser = parse_camera)]
-    camera: CameraArgument,
+    #[arg(long, value_name = "NAME|FILE", value_parser = parse_camera, required_unless_present = "turntable")]
+    camera: Option<CameraArgument>,
+    /// So many views round one person instead, side by side, the first from the side of the broadcast camera.
+    #[arg(long, value_name = "COUNT", requires = "person", conflicts_with = "camera", value_parser = clap::value_parser!(u32).range(1..=64))]
+    turntable: Option<u32>,
+    /// Who is in the middle of the turntable: a number of `player inspect`'s people.
+    #[arg(long, value_name = "ID", requires = "turntable")]
+    person: Option<u32>,
+    /// What no camera saw of people: solid, ghosted or hidden.
+    #[arg(long, value_name = "HOW", default_value = "solid", value_parser = parse_guessed)]
+    guessed: Guessed,
     /// Width and height of the picture in pixels.
     #[arg(long, value_name = "WxH", value_parser = super::parse_size)]
     size: (u32, u32),
@@ -53,19 +65,49 @@ fn parse_camera(text: &str) -> Result<CameraArgument, String> {
     text.parse().map(CameraArgument::Preset).map_err(|error: player::camera::NoSuchPreset| error.to_string())
 }
 
+fn parse_guessed(text: &str) -> Result<Guessed, String> {
+    let known = Guessed::ALL.into_iter().find(|guessed| guessed.name() == text);
+    known.ok_or_else(|| format!("{text} is none of {}", Guessed::ALL.map(Guessed::name).join(", ")))
+}
+
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let (runtime, stream) = super::open(&arguments.stream.stream)?;
     let (chunk_name, frame) = find_frame(&runtime, &stream, arguments.frame)?;
     let pitch = stream.manifest.pitch;
     let aspect = f64::from(arguments.size.0) / f64::from(arguments.size.1);
-    let camera = view(&arguments.camera, &pitch, frame.camera.as_ref(), aspect)
+    let cameras = cameras(arguments, &pitch, &frame, aspect)
         .with_context(|| format!("frame {} of {}", arguments.frame, arguments.stream.stream))?;
     let scene = FrameScene::new(&frame, &stream.manifest.people, stream.limits())
         .with_context(|| format!("{chunk_name}, frame {}", arguments.frame))?;
-    let picture = Offscreen::open()?.picture(&Stage::new(pitch), &scene, &camera, arguments.size)?;
+    let gpu = Offscreen::open()?;
+    let (width, height) = arguments.size;
+    let mut picture = RgbaImage::new(width * cameras.len() as u32, height);
+    for (place, camera) in cameras.iter().enumerate() {
+        let view = gpu.picture_with(&Stage::new(pitch), &scene, camera, arguments.guessed, arguments.size)?;
+        imageops::replace(&mut picture, &view, place as i64 * i64::from(width), 0);
+    }
     picture.save(&arguments.out).with_context(|| {
         format!("{}: cannot be written: give a name that ends in .png", arguments.out.display())
     })
+}
+
+/// Where the picture, or each of a turntable's, is seen from.
+fn cameras(
+    arguments: &RenderArguments,
+    pitch: &Pitch,
+    frame: &ChunkFrame,
+    aspect: f64,
+) -> anyhow::Result<Vec<ViewCamera>> {
+    if let Some(count) = arguments.turntable {
+        let wanted = arguments.person.unwrap_or_default();
+        let body = frame.bodies.iter().find(|body| body.person.0 == wanted).with_context(|| {
+            let there: Vec<String> = frame.bodies.iter().map(|body| body.person.0.to_string()).collect();
+            format!("person {wanted} is not in this frame: it has {}", there.join(", "))
+        })?;
+        return Ok(turntable(body.anchor_m.as_dvec3(), frame.camera.as_ref(), count, aspect));
+    }
+    let camera = arguments.camera.as_ref().context("give --camera or --turntable")?;
+    Ok(vec![view(camera, pitch, frame.camera.as_ref(), aspect)?])
 }
 
 fn view(

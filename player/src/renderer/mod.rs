@@ -56,6 +56,43 @@ struct StageUniform {
     markings: [[[f32; 4]; 2]; MOST_MARKINGS],
 }
 
+/// How surfaces that no camera saw are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Guessed {
+    /// Like those that were seen.
+    #[default]
+    Solid,
+    /// Pale and transparent.
+    Ghosted,
+    /// Not at all.
+    Hidden,
+}
+
+impl Guessed {
+    /// All of them, in the order of menus.
+    pub const ALL: [Self; 3] = [Self::Solid, Self::Ghosted, Self::Hidden];
+
+    /// The one after it, round and round.
+    #[must_use]
+    pub fn next(self) -> Self {
+        match self {
+            Self::Solid => Self::Ghosted,
+            Self::Ghosted => Self::Hidden,
+            Self::Hidden => Self::Solid,
+        }
+    }
+
+    /// Its name in menus and commands.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Solid => "solid",
+            Self::Ghosted => "ghosted",
+            Self::Hidden => "hidden",
+        }
+    }
+}
+
 /// Everything on the GPU that a picture of the table needs.
 pub struct Renderer {
     format: PictureFormat,
@@ -70,6 +107,9 @@ pub struct Renderer {
     fixtures: Triangles,
     nets: Triangles,
     bodies: Triangles,
+    /// Indices of the bodies that are of what was seen; the others are guessed.
+    seen_indices: u32,
+    guessed: Guessed,
     ball: Triangles,
     shadows: Growing,
     shadow_count: u32,
@@ -152,15 +192,23 @@ impl Renderer {
             fixtures,
             nets,
             bodies: triangles(),
+            seen_indices: 0,
+            guessed: Guessed::default(),
             ball: triangles(),
             shadows: Growing::new(device, BufferUsages::VERTEX),
             shadow_count: 0,
         }
     }
 
+    /// How surfaces that no camera saw are drawn from now on.
+    pub fn show_guessed(&mut self, guessed: Guessed) {
+        self.guessed = guessed;
+    }
+
     /// Uploads the people and the ball of a frame; they stay until the next one.
     pub fn upload(&mut self, device: &Device, queue: &Queue, frame: &FrameScene) {
         self.bodies.write(device, queue, &frame.vertices, &frame.indices);
+        self.seen_indices = frame.seen_indices as u32;
         match &frame.ball {
             Some(ball) => self.ball.write(device, queue, &ball.vertices, &ball.indices),
             None => self.ball.clear(),
@@ -234,7 +282,12 @@ impl Renderer {
         self.ball.draw(pass);
         pass.set_pipeline(&self.pipelines.body);
         pass.set_bind_group(1, self.atlas.bind_group(), &[]);
-        self.bodies.draw(pass);
+        let seen = self.seen_indices;
+        self.bodies.draw_part(pass, 0..if self.guessed == Guessed::Solid { u32::MAX } else { seen });
+        if self.guessed == Guessed::Ghosted {
+            pass.set_pipeline(&self.pipelines.ghost);
+            self.bodies.draw_part(pass, seen..u32::MAX);
+        }
         pass.set_pipeline(&self.pipelines.net);
         self.nets.draw(pass);
     }

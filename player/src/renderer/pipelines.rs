@@ -21,6 +21,7 @@ pub(super) struct Pipelines {
     pub(super) solid: RenderPipeline,
     pub(super) shadow: RenderPipeline,
     pub(super) body: RenderPipeline,
+    pub(super) ghost: RenderPipeline,
     pub(super) net: RenderPipeline,
 }
 
@@ -145,6 +146,16 @@ impl Pipelines {
                     "body",
                     include_str!("shaders/body.wgsl"),
                     Mixing::Opaque,
+                    size_of::<BodyVertex>(),
+                    &body_attributes,
+                ),
+            ),
+            ghost: build(
+                textured,
+                &Kind::triangles(
+                    "ghost",
+                    include_str!("shaders/ghost.wgsl"),
+                    Mixing::Transparent,
                     size_of::<BodyVertex>(),
                     &body_attributes,
                 ),

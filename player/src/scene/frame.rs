@@ -54,8 +54,10 @@ pub struct FrameScene {
     pub camera: Option<Camera>,
     /// Vertices of all bodies, world metres.
     pub vertices: Vec<BodyVertex>,
-    /// Three indices per triangle.
+    /// Three indices per triangle; first what was seen, then what is guessed.
     pub indices: Vec<u32>,
+    /// How many of them are of what was seen.
+    pub seen_indices: usize,
     /// How many people have a mesh.
     pub people: usize,
     /// Contact shadows.
@@ -76,14 +78,17 @@ impl FrameScene {
             people: frame.bodies.len(),
             ..Self::default()
         };
+        let mut guessed = Vec::new();
         for body in &frame.bodies {
             let shirt = people
                 .iter()
                 .find(|person| person.id == body.person)
                 .and_then(|person| person.shirt_rgb)
                 .unwrap_or(UNKNOWN_SHIRT);
-            scene.add_body(body, atlas.is_none().then_some(shirt));
+            scene.add_body(body, atlas.is_none().then_some(shirt), &mut guessed);
         }
+        scene.seen_indices = scene.indices.len();
+        scene.indices.append(&mut guessed);
         if let Some(ball) = &frame.ball {
             let centre = ball.position_m.as_vec3();
             let above = (centre.y - ball::BALL_RADIUS_M).max(0.0);
@@ -98,8 +103,8 @@ impl FrameScene {
         Ok(scene)
     }
 
-    /// Adds a body; with `shirt` it is painted in that colour, shaded by its own normals.
-    fn add_body(&mut self, body: &Body, shirt: Option<[u8; 3]>) {
+    /// Adds a body; with `shirt` it is painted in that colour, shaded by its own normals. Indices of what is guessed go to `guessed`.
+    fn add_body(&mut self, body: &Body, shirt: Option<[u8; 3]>, guessed: &mut Vec<u32>) {
         let first = self.vertices.len() as u32;
         let mesh = &body.mesh;
         let count = mesh.positions_m.len() as u32;
@@ -112,7 +117,10 @@ impl FrameScene {
         }
         // A triangle that names a vertex that is not there is left out; the decoder refuses such files anyway.
         let triangles = mesh.triangles.iter().filter(|triangle| triangle.iter().all(|&index| index < count));
-        self.indices.extend(triangles.flatten().map(|&index| first + index));
+        for &triangle in triangles {
+            let indices = if body.is_guessed(triangle) { &mut *guessed } else { &mut self.indices };
+            indices.extend(triangle.map(|index| first + index));
+        }
         self.shadows.push(contact_shadow(body));
     }
 }
@@ -198,6 +206,7 @@ mod tests {
                 uvs: vec![[0.0; 2]; 3],
                 triangles: vec![[0, 1, 2]],
             },
+            guessed_from_u: None,
         }
     }
 
@@ -209,6 +218,16 @@ mod tests {
         assert_eq!(scene.vertices[3].position_m, [-4.0, 0.0, 2.0]);
         assert_eq!(scene.indices, [0, 1, 2, 3, 4, 5]);
         assert!((scene.shadows[0].centre_m[0] - 10.25).abs() < 1e-5, "{:?}", scene.shadows[0]);
+    }
+
+    #[test]
+    fn what_is_guessed_comes_last() {
+        let mut half = triangle_at(0.0, 0.0);
+        half.mesh.uvs = vec![[0.7, 0.0]; 3];
+        half.guessed_from_u = Some(0.5);
+        let scene =
+            FrameScene::new(&frame_with(vec![half, triangle_at(3.0, 0.0)]), &[], &Limits::default()).unwrap();
+        assert_eq!((scene.indices.as_slice(), scene.seen_indices), (&[3, 4, 5, 0, 1, 2][..], 3));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use glam::Vec3;
 use serde::Deserialize;
 
 use super::{
-    Body, Chunk, ChunkError, ChunkFrame, EncodedImage, ImageFormat, draco,
+    Body, Chunk, ChunkError, ChunkFrame, EncodedImage, ImageFormat, draco, guessed_is_possible,
     index::{ChunkIndex, FrameIndex, LAYOUT, PersonTrack, SceneExtras},
 };
 use crate::{
@@ -71,12 +71,21 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Chunk, ChunkError> {
         let atlas = entry.image.map(|image| file.image(image, limits, &mut budget)).transpose()?;
         let mut bodies = Vec::with_capacity(entry.bodies.len());
         let mut seen = BTreeSet::new();
-        for &[person, mesh] in &entry.bodies {
+        let guessed = &entry.guessed_from_u;
+        if !(guessed.is_empty() || guessed.len() == entry.bodies.len())
+            || !guessed.iter().copied().all(guessed_is_possible)
+        {
+            let problem = "what is guessed of its bodies is not told for each";
+            return Err(ChunkError::Frame { frame: position, problem });
+        }
+        for (place, &[person, mesh]) in entry.bodies.iter().enumerate() {
             let track = index.people.get(person).ok_or(reference("person", person))?;
             if !seen.insert(track.id) {
                 return Err(ChunkError::Frame { frame: position, problem: "a person has two bodies" });
             }
-            bodies.push(file.body(position, *track, mesh, limits, &mut budget)?);
+            let guessed_from_u = guessed.get(place).copied().flatten();
+            let body = file.body(position, *track, mesh, limits, &mut budget)?;
+            bodies.push(Body { guessed_from_u, ..body });
         }
         if !entry.ball.is_none_or(|ball| ball.is_possible()) {
             return Err(ChunkError::Frame { frame: position, problem: "the ball is nowhere near the pitch" });
@@ -242,7 +251,7 @@ impl<'a> File<'a> {
             uv: draco_part.attributes.uv.ok_or_else(no_uv)?,
         };
         let mesh = draco::decode(self.view(draco_part.buffer_view)?, ids, counts).map_err(fail)?;
-        Ok(Body { person: track.id, anchor_m, mesh })
+        Ok(Body { person: track.id, anchor_m, mesh, guessed_from_u: None })
     }
 
     /// Element `frame` of an accessor of float triples.

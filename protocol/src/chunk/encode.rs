@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    Body, Chunk, ChunkError, ChunkFrame, draco,
+    Body, Chunk, ChunkError, ChunkFrame, draco, guessed_is_possible,
     index::{ChunkIndex, FrameIndex, LAYOUT, PersonTrack, SceneExtras},
 };
 use crate::{
@@ -95,7 +95,10 @@ fn finite(frame: &ChunkFrame) -> bool {
     camera
         && frame.ball.is_none_or(|ball| ball.is_possible())
         && figures.iter().flatten().all(|figure| figure.is_finite())
-        && frame.bodies.iter().all(|body| body.anchor_m.is_finite())
+        && frame
+            .bodies
+            .iter()
+            .all(|body| body.anchor_m.is_finite() && guessed_is_possible(body.guessed_from_u))
 }
 
 /// A chunk on its way into a document.
@@ -141,6 +144,10 @@ impl<'a> Writer<'a> {
                 duration: frame.duration,
                 image,
                 bodies: Vec::with_capacity(frame.bodies.len()),
+                guessed_from_u: match frame.bodies.iter().any(|body| body.guessed_from_u.is_some()) {
+                    true => frame.bodies.iter().map(|body| body.guessed_from_u).collect(),
+                    false => Vec::new(),
+                },
                 camera: frame.camera.map(Box::new),
                 quality: frame.quality,
                 ball: frame.ball,

@@ -56,6 +56,9 @@ pub(super) struct FrameIndex {
     pub(super) image: Option<usize>,
     /// `[index into people, mesh]` of every body.
     pub(super) bodies: Vec<[usize; 2]>,
+    /// For every body, the texture coordinate u from which on its texture is guessed; empty when nothing is told of anybody.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) guessed_from_u: Vec<Option<f32>>,
     /// The broadcast camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) camera: Option<Box<Camera>>,

@@ -159,4 +159,22 @@ pub struct Body {
     pub anchor_m: Vec3,
     /// The surface; positions in metres relative to `anchor_m` in world axes, texture coordinates into the frame's atlas.
     pub mesh: Mesh,
+    /// The texture coordinate u from which on the texture, and the surface that wears it, is guessed: no camera saw it. `None` when
+    /// nothing is told.
+    pub guessed_from_u: Option<f32>,
+}
+
+/// Whether a texture coordinate is one, when there is one.
+fn guessed_is_possible(from_u: Option<f32>) -> bool {
+    from_u.is_none_or(|u| (0.0..=1.0).contains(&u))
+}
+
+impl Body {
+    /// Whether a triangle of the mesh is guessed; one that reaches into what was seen is not.
+    #[must_use]
+    pub fn is_guessed(&self, triangle: [u32; 3]) -> bool {
+        let beyond =
+            |index: u32, from: f32| self.mesh.uvs.get(index as usize).is_some_and(|uv| uv[0] >= from);
+        self.guessed_from_u.is_some_and(|from| triangle.iter().all(|&index| beyond(index, from)))
+    }
 }

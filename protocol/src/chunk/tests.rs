@@ -248,6 +248,37 @@ fn lies_in_the_document_are_found() {
 }
 
 #[test]
+fn what_is_guessed_comes_back_and_is_told_for_every_body() {
+    let mut chunk = sample::chunk_of(0, 2, 3);
+    chunk.frames[1].bodies[2].guessed_from_u = Some(0.25);
+    let bytes = encode(&chunk, sample::TIMESCALE).unwrap();
+    let told = |chunk: &Chunk| -> Vec<Option<f32>> {
+        chunk.frames.iter().flat_map(|frame| frame.bodies.iter().map(|body| body.guessed_from_u)).collect()
+    };
+    assert_eq!(told(&decode(&bytes, &Limits::default()).unwrap()), told(&chunk));
+    for wrong in [serde_json::json!([null, 0.5]), serde_json::json!([0.1, 1.5, null])] {
+        let hostile = with_json(&bytes, |document| {
+            document["scenes"][0]["extras"]["holopitch"]["frames"][1]["guessed_from_u"] = wrong.clone();
+        });
+        let refused = decode(&hostile, &Limits::default());
+        assert!(matches!(refused, Err(ChunkError::Frame { frame: 1, .. })), "{refused:?}");
+    }
+    chunk.frames[0].bodies[0].guessed_from_u = Some(f32::NAN);
+    let refused = encode(&chunk, sample::TIMESCALE);
+    assert!(matches!(refused, Err(ChunkError::Frame { frame: 0, .. })), "{refused:?}");
+}
+
+#[test]
+fn a_triangle_is_guessed_when_all_its_corners_are() {
+    let uvs = vec![[0.2, 0.0], [0.6, 0.0], [0.7, 1.0], [0.9, 0.5]];
+    let mesh = Mesh { positions_m: vec![[0.0; 3]; 4], uvs, triangles: Vec::new() };
+    let body = Body { person: PersonId(1), anchor_m: Vec3::ZERO, mesh, guessed_from_u: Some(0.6) };
+    assert!(body.is_guessed([1, 2, 3]));
+    assert!(!body.is_guessed([0, 2, 3]) && !body.is_guessed([1, 2, 9]));
+    assert!(!Body { guessed_from_u: None, ..body }.is_guessed([1, 2, 3]));
+}
+
+#[test]
 fn unknown_fields_are_ignored() {
     let chunk = sample::chunk_of(0, 2, 2);
     let bytes = encode(&chunk, sample::TIMESCALE).unwrap();
@@ -318,7 +349,7 @@ proptest! {
             for (person, rows, bend, anchor) in bodies {
                 if frame.bodies.iter().all(|body: &Body| body.person.0 != person) {
                     let anchor_m = Vec3::from_array(anchor);
-                    frame.bodies.push(Body { person: PersonId(person), anchor_m, mesh: strip(rows, bend) });
+                    frame.bodies.push(Body { person: PersonId(person), anchor_m, mesh: strip(rows, bend), guessed_from_u: None });
                 }
             }
             now += duration;

@@ -1,10 +1,15 @@
 //! Section 3.2: the depth map of each player, by a network trained on rendered players.
 //!
-//! The network sees a square around the player (picture and mask, [`window`]) and the painted pose ([`paint`]), and
-//! gives the distances of the body's first and last surface from the upright plane through the player's anchor.
+//! Two networks see a square around the player (picture and mask, [`window`]) and the painted pose ([`paint`]). The first
+//! ([`lifting`]) says where the joints are in space, which the pose network guesses badly in small pictures; with those painted, the
+//! second gives the distances of the body's first and last surface from the upright plane through the player's anchor.
 
+mod lifting;
 mod map;
 mod paint;
+mod sight;
+mod skeleton;
+mod steady;
 mod surface;
 mod window;
 
@@ -17,20 +22,20 @@ use crate::{
     pose::{JOINTS, Joint, Person},
 };
 
+pub use lifting::{LIFTING_MODEL, PoseLifter};
 pub use map::DepthMap;
 pub use paint::View;
-pub(crate) use paint::{LIMBS, with_middles};
+pub(crate) use paint::{LAST_TRUNK_LIMB, LIMBS, with_middles};
+pub(crate) use skeleton::{Place, Side, Skeleton};
+pub use steady::{Moment, steady};
 pub use surface::WindowSurface;
 pub use window::Window;
 
-use paint::POSE_CHANNELS;
-use window::{GRID, PICTURE_SIZE};
+use sight::Sight;
+use window::PICTURE_SIZE;
 
 /// File name of the shipped network; its card is beside it.
 pub const MODEL_NAME: &str = "depth.onnx";
-/// Most pixels of a mask's rectangle: 8K pictures fit, a damaged mask does not fill the memory.
-const MOST_PIXELS: u64 = 7680 * 4320;
-
 /// Why a player got no depth.
 #[derive(Debug, thiserror::Error)]
 pub enum DepthError {
@@ -105,36 +110,13 @@ impl DepthEstimator {
         joints: &[Joint],
         mask: &Mask,
     ) -> Result<WindowSurface, DepthError> {
-        let pixels = u64::from(mask.width) * u64::from(mask.height);
-        if pixels > MOST_PIXELS || pixels != mask.coverage.len() as u64 {
-            return Err(DepthError::BrokenMask {
-                width: mask.width,
-                height: mask.height,
-                found: mask.coverage.len(),
-            });
-        }
-        let usable = joints.iter().filter(|j| j.pixel.is_finite() && j.depth_m.is_finite()).count();
-        let broken_pose = DepthError::BrokenPose { found: usable };
-        if usable != joints.len() {
-            return Err(broken_pose);
-        }
-        let scale = view.pixels_per_metre;
-        let seen = scale.is_finite() && scale > 0.0 && view.descent.is_finite();
-        if !seen || image.width() == 0 || image.height() == 0 {
-            return Err(DepthError::OutOfView);
-        }
-        let window = Window::around(mask, view.pixels_per_metre).ok_or(DepthError::EmptyMask)?;
-        let pose = paint::paint(joints, &window, view).ok_or(broken_pose)?;
-        let picture = window.picture(image, mask);
-        let outputs = self.model.run(&[
-            (&[1, 4, PICTURE_SIZE, PICTURE_SIZE], &picture),
-            (&[1, POSE_CHANNELS, GRID, GRID], &pose),
-        ])?;
+        let sight = Sight::of(image, view, joints, mask)?;
+        let outputs = self.model.run(&sight.tensors())?;
         let cells = PICTURE_SIZE * PICTURE_SIZE;
         let planes: Option<Vec<Vec<f32>>> =
             outputs.iter().map(|plane| (plane.data.len() == cells).then(|| plane.data.clone())).collect();
         match planes.and_then(|planes| <[Vec<f32>; surface::PLANES]>::try_from(planes).ok()) {
-            Some(planes) => Ok(WindowSurface::new(window, planes)),
+            Some(planes) => Ok(WindowSurface::new(sight.window, planes)),
             None => Err(self.model.unexpected("six planes of 1×128×128", &outputs).into()),
         }
     }

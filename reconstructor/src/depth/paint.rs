@@ -44,6 +44,9 @@ pub(crate) const LIMBS: [(usize, usize, f64); 18] = [
     (30, 32, 0.05),
 ];
 
+/// Limbs up to this one are head and trunk.
+pub(crate) const LAST_TRUNK_LIMB: usize = 5;
+
 /// How the camera sees a player: what turns pixels of the clip into metres at the player.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {

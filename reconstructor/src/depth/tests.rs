@@ -1,5 +1,7 @@
 //! The estimator against the trainer's arithmetic (`training/depth/fixture.py` wrote the vector), and against hostile input.
 
+use std::collections::BTreeMap;
+
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
@@ -15,6 +17,8 @@ struct Vector {
     window: [f64; 3],
     picture: Vec<(usize, f32)>,
     pose: Vec<(usize, f32)>,
+    /// Metres right of and below the middle of the window, and behind the hips, of the joints that are lifted.
+    lifted: BTreeMap<usize, [f64; 3]>,
     /// Values of the six planes.
     planes: [Vec<(usize, f64)>; surface::PLANES],
 }
@@ -81,6 +85,24 @@ fn the_network_says_here_what_it_says_to_the_trainer() {
             let off = (surface.value(plane, cell) - expected).abs();
             assert!(off < 1e-3, "plane {plane}, cell {cell}: {off} off");
         }
+    }
+}
+
+#[test]
+fn joints_are_lifted_here_as_for_the_trainer() {
+    if !inference::ready() {
+        return;
+    }
+    let vector = Vector::read();
+    let (image, mask) = player();
+    let lifted = PoseLifter::load().unwrap().lift(&image, vector.view(), &vector.joints(), &mask).unwrap();
+    let [x, y, _] = vector.window;
+    assert!(vector.lifted.len() >= 15);
+    for (joint, [right_m, down_m, behind_m]) in &vector.lifted {
+        let expected = DVec2::new(x, y) + DVec2::new(*right_m, *down_m) * vector.pixels_per_metre;
+        let off_m = (lifted[*joint].pixel - expected).length() / vector.pixels_per_metre;
+        assert!(off_m < 1e-3, "joint {joint} is {off_m} m off");
+        assert!((f64::from(lifted[*joint].depth_m) - behind_m).abs() < 1e-3, "joint {joint}");
     }
 }
 

@@ -162,6 +162,7 @@ impl StreamWriter {
                     person: surface.person,
                     anchor_m: surface.anchor_m.as_vec3(),
                     mesh: Mesh { uvs, ..surface.mesh },
+                    guessed_from_u: Some(packed.uv(index, [surface.guessed_from_u, 0.0])[0]),
                 });
             }
             atlas = Some(jpeg);

@@ -76,6 +76,7 @@ fn frame(index: u32, people: u32) -> StreamFrame {
                 anchor_m: body.anchor_m.as_dvec3(),
                 mesh: body.mesh,
                 texture: RgbImage::from_pixel(40, 90, colour(body.person)),
+                guessed_from_u: 0.5,
                 confidence: 1.0,
             })
             .collect(),

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use protocol::chunk::{Body, ChunkFrame};
 use serde::{Deserialize, Serialize};
 
-use super::surface::{Surface, Triangle, spread};
+use super::surface::{Surface, body_triangles, spread};
 use crate::{
     assignment::{Pair, most_gain},
     report::{median, quantile},
@@ -85,7 +85,7 @@ struct Tally {
 impl Tally {
     fn matched(&mut self, true_body: &Body, our_body: &Body) {
         self.positions_m.push(on_pitch(true_body).distance(on_pitch(our_body)));
-        let (true_triangles, our_triangles) = (triangles(true_body), triangles(our_body));
+        let (true_triangles, our_triangles) = (body_triangles(true_body), body_triangles(our_body));
         let surfaces = (Surface::new(&true_triangles), Surface::new(&our_triangles));
         let (Some(true_surface), Some(our_surface)) = surfaces else { return };
         let our_points = spread(&our_triangles, POINTS);
@@ -121,16 +121,6 @@ fn on_pitch(body: &Body) -> DVec2 {
     DVec2::new(f64::from(body.anchor_m.x), f64::from(body.anchor_m.z))
 }
 
-/// The body's triangles in the world.
-fn triangles(body: &Body) -> Vec<Triangle> {
-    let point = |index: u32| {
-        let position = body.mesh.positions_m.get(index as usize)?;
-        Some((glam::Vec3::from(*position) + body.anchor_m).as_dvec3())
-    };
-    let all = body.mesh.triangles.iter();
-    all.filter_map(|[a, b, c]| Some([point(*a)?, point(*b)?, point(*c)?])).collect()
-}
-
 fn mean_distance(points: &[DVec3], surface: &Surface) -> Option<f64> {
     (!points.is_empty())
         .then(|| points.iter().map(|p| surface.distance(*p)).sum::<f64>() / points.len() as f64)
@@ -154,14 +144,14 @@ pub(super) fn pairs(truth: &[Body], ours: &[Body]) -> Vec<(usize, usize)> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::Vec3;
     use protocol::{chunk::FrameQuality, manifest::PersonId, mesh::Mesh, time::Ticks};
 
     use super::*;
 
     /// An upright box of 0.4 × 1.8 × 0.3 m that stands on `(x, z)`, closed all round.
-    fn box_at(person: u32, x: f32, z: f32) -> Body {
+    pub(in super::super) fn box_at(person: u32, x: f32, z: f32) -> Body {
         let corner = |i: u32| {
             let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 0 { low } else { high };
             [pick(0, -0.2, 0.2), pick(1, 0.0, 1.8), pick(2, -0.15, 0.15)]
@@ -172,10 +162,10 @@ mod tests {
             uvs: vec![[0.0; 2]; 8],
             triangles: quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect(),
         };
-        Body { person: PersonId(person), anchor_m: Vec3::new(x, 0.0, z), mesh }
+        Body { person: PersonId(person), anchor_m: Vec3::new(x, 0.0, z), mesh, guessed_from_u: None }
     }
 
-    fn frame(clip_frame: u32, bodies: Vec<Body>) -> ChunkFrame {
+    pub(in super::super) fn frame(clip_frame: u32, bodies: Vec<Body>) -> ChunkFrame {
         ChunkFrame {
             clip_frame,
             start: Ticks(i64::from(clip_frame)),

@@ -6,6 +6,7 @@ pub mod ball;
 pub mod calibration;
 pub mod depth;
 pub mod detection;
+pub mod flicker;
 pub mod frame_truth;
 pub mod jumps;
 pub mod labelled;

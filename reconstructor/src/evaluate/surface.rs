@@ -1,9 +1,20 @@
 //! Distances between surfaces: points spread evenly over triangles, and the nearest triangle by a tree of boxes.
 
 use glam::DVec3;
+use protocol::chunk::Body;
 
 /// A triangle, world metres.
 pub(super) type Triangle = [DVec3; 3];
+
+/// The body's triangles in the world.
+pub(super) fn body_triangles(body: &Body) -> Vec<Triangle> {
+    let point = |index: u32| {
+        let position = body.mesh.positions_m.get(index as usize)?;
+        Some((glam::Vec3::from(*position) + body.anchor_m).as_dvec3())
+    };
+    let all = body.mesh.triangles.iter();
+    all.filter_map(|[a, b, c]| Some([point(*a)?, point(*b)?, point(*c)?])).collect()
+}
 
 /// `count` points spread evenly by area over the triangles, the same ones every time.
 pub(super) fn spread(triangles: &[Triangle], count: usize) -> Vec<DVec3> {
@@ -122,7 +133,12 @@ impl Surface {
 
     /// Distance of a point from the surface, metres.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
-        let mut best = f64::INFINITY;
+        self.nearest(p).map_or(f64::INFINITY, |(near, _)| p.distance(near))
+    }
+
+    /// The point of the surface nearest to `p`, and the normal of its triangle; `None` for one that is not finite.
+    pub(super) fn nearest(&self, p: DVec3) -> Option<(DVec3, DVec3)> {
+        let (mut best, mut found) = (f64::INFINITY, None);
         let mut waiting = vec![(0.0, 0_u32)];
         while let Some((bound, index)) = waiting.pop() {
             if bound >= best {
@@ -131,7 +147,11 @@ impl Surface {
             let node = &self.nodes[index as usize];
             if let Some((start, end)) = node.leaf {
                 for triangle in &self.triangles[start as usize..end as usize] {
-                    best = best.min(p.distance_squared(nearest_on_triangle(p, *triangle)));
+                    let near = nearest_on_triangle(p, *triangle);
+                    let distance = p.distance_squared(near);
+                    if distance < best {
+                        (best, found) = (distance, Some((near, *triangle)));
+                    }
                 }
                 continue;
             }
@@ -142,7 +162,8 @@ impl Surface {
             let [near, far] = if children[0].0 <= children[1].0 { [0, 1] } else { [1, 0] };
             waiting.extend([children[far], children[near]].into_iter().filter(|(bound, _)| *bound < best));
         }
-        best.sqrt()
+        let (near, [a, b, c]) = found?;
+        Some((near, (b - a).cross(c - a).normalize_or_zero()))
     }
 }
 

@@ -5,6 +5,9 @@ use glam::{DVec2, DVec3};
 use super::{VirtualPlane, pieces::Surface, texture::CutOut};
 use crate::depth::DepthMap;
 
+/// The right half of a texture has the guessed colours.
+pub(super) const GUESSED_FROM_U: f32 = 0.5;
+
 /// What lies this far behind the first surface is hidden by it, metres.
 const BEHIND_M: f64 = 0.09;
 
@@ -38,7 +41,7 @@ pub(super) fn split(
                 *place = charts.points.len() as u32;
                 charts.points.push(index);
                 let [u, v] = seen.uv(pixels[index as usize]);
-                charts.uvs.push([(u + guessed as f32) / 2.0, v]);
+                charts.uvs.push([u / 2.0 + guessed as f32 * GUESSED_FROM_U, v]);
             }
             *place
         });

@@ -9,6 +9,7 @@ mod contact;
 mod decimate;
 mod nets;
 mod pieces;
+mod skin;
 mod texture;
 mod volume;
 
@@ -17,9 +18,13 @@ use image::RgbImage;
 use protocol::{camera::Camera, manifest::PersonId, mesh::Mesh};
 use thiserror::Error;
 
-use crate::{depth::DepthMap, pose::Person};
+use crate::{
+    depth::{DepthMap, View},
+    pose::Person,
+};
 
 pub use contact::MAX_CORRECTION_M;
+pub use skin::{Skin, SkinSample};
 
 /// The surface of one player in one frame.
 #[derive(Clone, Debug)]
@@ -34,6 +39,8 @@ pub struct BodySurface {
     pub mesh: Mesh,
     /// Left the piece of the clip that the body is seen in, right the colours of what is not seen.
     pub texture: RgbImage,
+    /// Texture coordinate u from which on the texture is guessed.
+    pub guessed_from_u: f32,
     /// 0..1.
     pub confidence: f32,
 }
@@ -140,10 +147,18 @@ impl VirtualPlane {
     }
 }
 
+/// What a frame shows of a person, for the [`Skin`] that [`lift`] takes; nothing when the pose does not tell where the person faces.
+#[must_use]
+pub fn skin_of(image: &RgbImage, camera: &Camera, person: &Person, depth: &DepthMap) -> Vec<SkinSample> {
+    let wearer = View::from_camera(camera, person.ground_m)
+        .and_then(|view| skin::Wearer::new(&person.joints, depth, view));
+    wearer.map(|wearer| wearer.samples(image)).unwrap_or_default()
+}
+
 /// Lifts a player to a closed textured mesh on the pitch.
 ///
-/// `image` is the frame that `depth` was estimated on. The mesh stands on the pitch, or as high above it as `figure` says: see
-/// [`MAX_CORRECTION_M`].
+/// `image` is the frame that `depth` was estimated on, `skin` what other frames show of the person. The mesh stands on the pitch,
+/// or as high above it as `figure` says: see [`MAX_CORRECTION_M`].
 /// Triangles are counter-clockwise seen from outside.
 ///
 /// # Errors
@@ -154,6 +169,7 @@ pub fn lift(
     figure: Figure,
     person: &Person,
     depth: &DepthMap,
+    skin: Option<&Skin>,
     budget: &MeshBudget,
 ) -> Result<BodySurface, MeshError> {
     let anchor_m = person.ground_m.with_y(0.0);
@@ -169,7 +185,11 @@ pub fn lift(
     let pixels: Option<Vec<DVec2>> = surface.points_m.iter().map(|point| camera.project(*point)).collect();
     let pixels = pixels.ok_or(MeshError::NoPlane)?;
     let seen = texture::cut_out(image, &mask, &pixels);
-    let guessed = behind::colours(&seen, &mask, person, 1.0 / footprint_m);
+    let mut guessed = behind::colours(&seen, &mask, person, 1.0 / footprint_m);
+    if let Some(skin) = skin {
+        behind::paint_seen(&mut guessed, &seen, skin, camera, person, depth);
+    }
+    behind::blend(&mut guessed, &seen, &mask, 1.0 / footprint_m);
     let charts = charts::split(&surface, &pixels, depth, &plane, &seen);
     let positions_m = charts
         .points
@@ -183,6 +203,7 @@ pub fn lift(
         anchor_m,
         mesh: Mesh { positions_m, uvs: charts.uvs, triangles: charts.triangles },
         texture: texture::side_by_side(&seen.image, &guessed),
+        guessed_from_u: charts::GUESSED_FROM_U,
         confidence: person.pose_score.clamp(0.0, 1.0),
     })
 }

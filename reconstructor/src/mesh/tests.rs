@@ -94,7 +94,7 @@ fn lifted(
     triangles: usize,
 ) -> BodySurface {
     let budget = MeshBudget { triangles };
-    lift(image, camera, Figure::standing(PersonId(3), 7), &person_at(anchor_m), depth, &budget).unwrap()
+    lift(image, camera, Figure::standing(PersonId(3), 7), &person_at(anchor_m), depth, None, &budget).unwrap()
 }
 
 /// Vertices at the same place are one: charts share none.
@@ -225,6 +225,7 @@ fn texture_coordinates_point_at_the_pixel_a_vertex_was_seen_in() {
         Figure::standing(PersonId(0), 0),
         &person_at(anchor_m),
         &depth,
+        None,
         &MeshBudget::default(),
     )
     .unwrap();
@@ -272,7 +273,7 @@ fn broken_depth_maps_are_refused() {
     let image = RgbImage::new(1920, 1080);
     let attempt = |anchor_m: DVec3, depth: &DepthMap| {
         let (figure, budget) = (Figure::standing(PersonId(0), 0), MeshBudget::default());
-        lift(&image, &camera, figure, &person_at(anchor_m), depth, &budget)
+        lift(&image, &camera, figure, &person_at(anchor_m), depth, None, &budget)
     };
     let map = DepthMap {
         first_px: DVec2::splat(5.0),

@@ -9,12 +9,13 @@ use glam::{DVec2, DVec3};
 
 use super::{MeshError, VirtualPlane};
 use crate::{
-    depth::{DepthMap, LIMBS, View, with_middles},
+    depth::{DepthMap, LAST_TRUNK_LIMB, LIMBS, View, with_middles},
     pose::Person,
 };
 
-/// A ray that stays in the body for longer than this may have passed air, metres.
+/// A ray that stays in the body for longer than this may have passed air, metres: where there is trunk or head, and among arms and legs.
 const THICK_M: f64 = 0.34;
+const THICK_LIMB_M: f64 = 0.24;
 /// Air between parts that is thinner than this is filled, metres.
 const GAP_M: f64 = 0.06;
 /// Depth of a slab, metres.
@@ -25,7 +26,7 @@ const SLABS: usize = 96;
 const REACH_M: f64 = 1.6;
 /// Balls that stand for a limb.
 const BALLS: usize = 6;
-/// Radius of what is no known limb, metres.
+/// Radius of parts of a body without a skeleton, metres.
 const USUAL_RADIUS_M: f64 = 0.12;
 
 /// How far inside the body each sample of a grid is, metres, negative outside: cells of the depth map with a ring round them, by slabs.
@@ -158,6 +159,9 @@ struct Ball {
     /// Distance from the upright plane, metres.
     offset_m: f64,
     radius_m: f64,
+    /// Whether it may lie between the first and the last part of a ray. A leg across the sight is the one or the other; where the pose has it
+    /// between them, it is wrong, and a curtain would hang there.
+    fills: bool,
 }
 
 /// The skeleton as balls.
@@ -176,14 +180,16 @@ impl Limbs {
         };
         let hips_y_px = joints.last().map_or(0.0, |hips| hips.pixel.y);
         let mut balls = Vec::new();
-        for &(from, to, radius_m) in &LIMBS {
+        for (index, &(from, to, radius_m)) in LIMBS.iter().enumerate() {
             let (Some(from), Some(to)) = (joints.get(from), joints.get(to)) else { continue };
+            let across_m = from.pixel.distance(to.pixel) * footprint_m;
+            let fills = index <= LAST_TRUNK_LIMB || f64::from(to.depth_m - from.depth_m).abs() > across_m;
             balls.extend((0..BALLS).map(|k| {
                 let share = k as f64 / (BALLS - 1) as f64;
                 let pixel = from.pixel.lerp(to.pixel, share);
                 let behind_hips_m = f64::from(from.depth_m) * (1.0 - share) + f64::from(to.depth_m) * share;
                 let slope_m = (pixel.y - hips_y_px) * footprint_m * view.descent;
-                Ball { pixel, offset_m: behind_hips_m - slope_m, radius_m }
+                Ball { pixel, offset_m: behind_hips_m - slope_m, radius_m, fills }
             }));
         }
         balls.retain(|ball| ball.pixel.is_finite() && ball.offset_m.is_finite());
@@ -198,7 +204,7 @@ impl Limbs {
         for (cell, ray) in rays.rays.iter().enumerate() {
             let Some([front, back]) = ray.surfaces_m.filter(|[f, b]| b - f < THICK_M) else { continue };
             let pixel = rays.pixel(depth, cell);
-            let on: Vec<f64> = self.at(pixel).map(|(offset_m, _, _)| offset_m).collect();
+            let on: Vec<f64> = self.at(pixel).map(|(ball, _)| ball.offset_m).collect();
             if !on.is_empty() {
                 shifts.push((front + back) / 2.0 - on.iter().sum::<f64>() / on.len() as f64);
             }
@@ -208,26 +214,35 @@ impl Limbs {
         self.balls.iter_mut().for_each(|ball| ball.offset_m += shift);
     }
 
-    /// The balls that a ray meets: where their middles are, half the way through, and their radius, metres.
-    fn at(&self, pixel: DVec2) -> impl Iterator<Item = (f64, f64, f64)> {
+    /// The balls that a ray meets, and half the way through each, metres.
+    fn at(&self, pixel: DVec2) -> impl Iterator<Item = (&Ball, f64)> {
         self.balls.iter().filter_map(move |ball| {
             let beside_m = ball.pixel.distance(pixel) * self.footprint_m;
             let half = ball.radius_m * ball.radius_m - beside_m * beside_m;
-            (half > 0.0).then(|| (ball.offset_m, half.sqrt(), ball.radius_m))
+            (half > 0.0).then(|| (ball, half.sqrt()))
         })
+    }
+
+    /// The ball that a ray comes closest to.
+    fn closest(&self, pixel: DVec2) -> Option<&Ball> {
+        let edge_m = |ball: &Ball| ball.pixel.distance(pixel) * self.footprint_m - ball.radius_m;
+        self.balls.iter().min_by(|a, b| edge_m(a).total_cmp(&edge_m(b)))
     }
 
     /// The stretches of a ray that are inside the body.
     fn parts(&self, pixel: DVec2, [front, back]: [f64; 2], parts: &mut Vec<[f64; 2]>) {
-        if back - front <= THICK_M {
+        // Where the skeleton passes beside a ray, the limb is like its closest part.
+        let closest = self.closest(pixel);
+        let slender = closest.is_some_and(|ball| !ball.fills) && self.at(pixel).all(|(ball, _)| !ball.fills);
+        if back - front <= if slender { THICK_LIMB_M } else { THICK_M } {
             parts.push([front, back]);
             return;
         }
-        let (mut nearest, mut farthest) =
-            ((f64::INFINITY, USUAL_RADIUS_M), (f64::NEG_INFINITY, USUAL_RADIUS_M));
-        for (offset_m, half_m, radius_m) in self.at(pixel) {
+        let usual_m = closest.map_or(USUAL_RADIUS_M, |ball| ball.radius_m);
+        let (mut nearest, mut farthest) = ((f64::INFINITY, usual_m), (f64::NEG_INFINITY, usual_m));
+        for (&Ball { offset_m, radius_m, fills, .. }, half_m) in self.at(pixel) {
             let part = [(offset_m - half_m).max(front), (offset_m + half_m).min(back)];
-            if part[0] < part[1] {
+            if fills && part[0] < part[1] {
                 parts.push(part);
             }
             if offset_m < nearest.0 {
@@ -257,7 +272,12 @@ mod tests {
     use super::*;
 
     fn limbs(balls: &[(f64, f64)]) -> Limbs {
-        let ball = |&(offset_m, radius_m): &(f64, f64)| Ball { pixel: DVec2::ZERO, offset_m, radius_m };
+        let ball = |&(offset_m, radius_m): &(f64, f64)| Ball {
+            pixel: DVec2::ZERO,
+            offset_m,
+            radius_m,
+            fills: radius_m > 0.07,
+        };
         Limbs { balls: balls.iter().map(ball).collect(), footprint_m: 0.02 }
     }
 
@@ -270,9 +290,11 @@ mod tests {
     #[test]
     fn a_thin_ray_is_one_part_and_legs_behind_each_other_are_two() {
         let legs = limbs(&[(-0.2, 0.06), (0.3, 0.06)]);
-        assert_eq!(parts(&legs, [-0.1, 0.2]), vec![[-0.1, 0.2]]);
+        assert_eq!(parts(&legs, [-0.1, 0.1]), vec![[-0.1, 0.1]]);
         let two = parts(&legs, [-0.27, 0.37]);
         assert_eq!(two.len(), 2, "{two:?}");
+        // A leg that the pose puts in the middle does not join them.
+        assert_eq!(parts(&limbs(&[(-0.2, 0.06), (0.05, 0.06), (0.3, 0.06)]), [-0.27, 0.37]).len(), 2);
         assert!(two[0][0] == -0.27 && two[0][1] < -0.1 && two[1][0] > 0.2 && two[1][1] == 0.37);
     }
 

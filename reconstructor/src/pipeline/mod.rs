@@ -1,5 +1,5 @@
-//! The whole way from a clip to a stream: `ingest → shots → detection → calibration → pose → tracking → teams → numbers → jumps → ball → segmentation → depth →
-//! mesh → trajectory → encode`.
+//! The whole way from a clip to a stream: `ingest → shots → detection → calibration → pose → tracking → teams → numbers → jumps → ball → segmentation → lifting → depth →
+//! skin → mesh → trajectory → encode`.
 //!
 //! Costly stages keep their results frame by frame in the work folder and take them from there when the clip, the options
 //! and the networks are the same. What a stage could not do for a person or a frame goes to the [`Reporter`]; only what
@@ -55,13 +55,15 @@ pub fn reconstruct(
     // A folder that cannot be written is known now, not after the long work.
     std::fs::create_dir_all(&options.out)
         .map_err(|source| PipelineError::Out { path: options.out.clone(), source })?;
-    let Seen { detections, cameras, people, tracks, members, numbers, ball, lifts } = run.observe()?;
+    let Seen { detections, cameras, mut people, tracks, members, numbers, ball, lifts } = run.observe()?;
     let masks = run.segment(&people, &tracks)?;
     let masks = players::by_frame(&masks, &tracks, people.len());
     if let Some(out) = &options.overlay {
         run.overlay(out, &cameras, &masks, &ball)?;
     }
+    run.lift(&cameras, &mut people, &masks, &tracks)?;
     let depths = run.depth(&cameras, &people, &masks)?;
+    let skins = run.skins(&cameras, &people, &masks, &depths)?;
     let paths = run.smooth(&people, &tracks, options.smoothing);
     let figures = run.write(&write::Scene {
         out: &options.out,
@@ -73,6 +75,7 @@ pub fn reconstruct(
         numbers: &numbers,
         masks: &masks,
         depths: &depths,
+        skins: &skins,
         paths: &paths,
         ball: &ball,
         heights_m: &air::heights(&lifts, &tracks),

@@ -8,22 +8,29 @@ use std::{
 use glam::DVec3;
 use protocol::manifest::PersonId;
 
-use super::{PipelineError, run::Run, work::Results};
+use super::{PipelineError, frames::each_frame, run::Run, work::Results};
 use crate::{
     calibration::CameraEstimate,
-    depth::{self, DepthError, DepthEstimator, DepthMap},
+    depth::{self, DepthError, DepthEstimator, DepthMap, PoseLifter, View},
     geometry::Mask,
+    mesh::{self, Skin},
     numbers::Readings,
-    pose::{POSE_SCORE_MIN, Person},
+    pose::{Joint, POSE_SCORE_MIN, Person},
     report::{Failure, Loss, Stage},
     segmentation::{self, FrameSeen, PlayerMask, RefiningSegmenter, Segmenter},
+    shots::ShotList,
     teams::{self, Member},
     tracking::{self, Sighting, Track, across::Clip},
     trajectory::{self, Path, Smoothing},
 };
 
+/// One frame of so many is looked at for what people look like all round.
+const SKIN_STEP: usize = 3;
+
 /// A depth map, or why there is none.
 pub(super) type PersonDepth = Result<DepthMap, String>;
+/// Joints in space, or why they stay as they were read.
+type PersonJoints = Result<Vec<Joint>, String>;
 
 /// Smooths poses along the tracks of each shot; gives those that were made from the frames before and after.
 pub(super) fn smooth_poses(
@@ -173,6 +180,61 @@ impl Run<'_> {
         Ok(masks)
     }
 
+    /// Puts the joints of everybody with a mask to where they are in space, and smooths them along the tracks once more.
+    pub(super) fn lift(
+        &mut self,
+        cameras: &[CameraEstimate],
+        people: &mut [Vec<Person>],
+        masks: &[FrameMasks<'_>],
+        tracks: &[Track],
+    ) -> Result<(), PipelineError> {
+        let settings = format!("{:?}", self.options.tracking);
+        let results = self.results(Stage::Lifting, depth::LIFTING_MODEL, &[settings.as_bytes()])?;
+        let wanted: Vec<bool> = masks.iter().map(|masks| !masks.is_empty()).collect();
+        let seen = &*people;
+        let lifted = self.per_frame(
+            Stage::Lifting,
+            &results,
+            &wanted,
+            || Ok(PoseLifter::load()?),
+            |lifter, frame| {
+                let mut all: BTreeMap<u32, PersonJoints> = BTreeMap::new();
+                let Some(camera) = cameras.get(frame.index).and_then(|estimate| estimate.camera) else {
+                    return Ok(all);
+                };
+                for (id, person, mask) in of_frame(frame.index, masks, seen) {
+                    let view = View::from_camera(&camera, person.ground_m).ok_or(DepthError::OutOfView);
+                    let joints =
+                        match view.and_then(|view| lifter.lift(&frame.image, view, &person.joints, mask)) {
+                            Ok(joints) => Ok(joints),
+                            Err(error @ DepthError::Inference(_)) => return Err(error.into()),
+                            Err(error) => Err(error.to_string()),
+                        };
+                    all.insert(id.0, joints);
+                }
+                Ok(all)
+            },
+        )?;
+        for (index, frame) in lifted.into_iter().enumerate() {
+            for (person, joints) in frame.unwrap_or_default() {
+                let place = masks.get(index).and_then(|masks| masks.get(&PersonId(person)));
+                let place = place.map(|mask| mask.sighting.person_index);
+                match (joints, place.and_then(|place| people.get_mut(index)?.get_mut(place))) {
+                    (Ok(joints), Some(known)) => known.joints = joints,
+                    (Err(reason), _) => {
+                        let (stage, frame) = (Stage::Lifting, self.clip_frame(index));
+                        let (loss, person) = (Loss::Fallback, Some(person));
+                        let reason = format!("{reason}; the pose stays as it was read");
+                        self.reporter.note(Failure { stage, loss, frame, person, reason });
+                    }
+                    (Ok(_), None) => {}
+                }
+            }
+        }
+        trajectory::smooth_poses(people, &in_shots(tracks, &self.shots), cameras);
+        Ok(())
+    }
+
     /// The depth map of every mask; they stay in the work folder.
     pub(super) fn depth(
         &mut self,
@@ -222,6 +284,49 @@ impl Run<'_> {
         Ok(results)
     }
 
+    /// What everybody looks like all round, from some of the frames.
+    pub(super) fn skins(
+        &mut self,
+        cameras: &[CameraEstimate],
+        people: &[Vec<Person>],
+        masks: &[FrameMasks<'_>],
+        depths: &Results,
+    ) -> Result<BTreeMap<PersonId, Skin>, PipelineError> {
+        let started = Instant::now();
+        let wanted: Vec<bool> =
+            masks.iter().enumerate().map(|(i, masks)| i % SKIN_STEP == 0 && !masks.is_empty()).collect();
+        let expected = wanted.iter().filter(|wanted| **wanted).count();
+        let progress = self.reporter.progress(Stage::Skin, expected);
+        let mut skins: BTreeMap<PersonId, Skin> = BTreeMap::new();
+        let read = each_frame(
+            || self.clip.frames(),
+            self.options.threads,
+            &wanted,
+            || Ok(()),
+            |(), frame| {
+                let camera = cameras.get(frame.index).and_then(|estimate| estimate.camera);
+                let Some(camera) = camera else { return Ok(Vec::new()) };
+                let depths: BTreeMap<u32, PersonDepth> = depths.load(frame.index).unwrap_or_default();
+                let people = of_frame(frame.index, masks, people).filter_map(|(id, person, _)| {
+                    let map = depths.get(&id.0)?.as_ref().ok()?;
+                    Some((id, mesh::skin_of(&frame.image, &camera, person, map)))
+                });
+                Ok(people.collect())
+            },
+            |_, shown| {
+                for (id, samples) in shown {
+                    skins.entry(id).or_default().add(&samples);
+                }
+                progress.advance(1);
+                Ok(())
+            },
+        )?;
+        drop(progress);
+        self.check_all_read(read, expected)?;
+        self.reporter.stage_done(Stage::Skin, started.elapsed(), 0);
+        Ok(skins)
+    }
+
     /// The smooth path of everybody. Paths need only the anchors, so they are solved before the surfaces are lifted, and
     /// each surface is moved as it comes: no more than a few frames of surfaces are in memory.
     pub(super) fn smooth(
@@ -263,6 +368,17 @@ impl Run<'_> {
     }
 }
 
+/// Every track's part in each shot: over a cut people are seen from somewhere else.
+fn in_shots(tracks: &[Track], shots: &ShotList) -> Vec<Track> {
+    let mut parts: BTreeMap<(PersonId, Option<usize>), Vec<Sighting>> = BTreeMap::new();
+    for track in tracks {
+        for sighting in &track.sightings {
+            parts.entry((track.person, shots.shot_of(sighting.frame))).or_default().push(*sighting);
+        }
+    }
+    parts.into_iter().map(|((person, _), sightings)| Track { person, sightings }).collect()
+}
+
 /// The people of a frame with a mask.
 pub(super) fn of_frame<'a>(
     index: usize,
@@ -292,4 +408,21 @@ pub(super) fn by_frame<'a>(masks: &'a [PlayerMask], tracks: &[Track], frames: us
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shots::Shot;
+
+    #[test]
+    fn a_track_over_a_cut_is_smoothed_in_two_parts() {
+        let shots =
+            ShotList { shots: vec![Shot { frames: 0..5 }, Shot { frames: 5..9 }], ..ShotList::default() };
+        let sightings = [1, 3, 4, 5, 8].map(|frame| Sighting { frame, person_index: 0 }).to_vec();
+        let parts = in_shots(&[Track { person: PersonId(2), sightings }], &shots);
+        let frames: Vec<Vec<usize>> =
+            parts.iter().map(|part| part.sightings.iter().map(|sighting| sighting.frame).collect()).collect();
+        assert_eq!(frames, [vec![1, 3, 4], vec![5, 8]]);
+    }
 }

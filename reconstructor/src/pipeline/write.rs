@@ -22,16 +22,21 @@ use super::{
 use crate::{
     ball::BallEstimate,
     calibration::CameraEstimate,
+    depth::{self, DepthMap, Moment, View},
     detection::Detection,
     encode::{StreamFrame, StreamHeader, StreamWriter},
     ingest::Clip,
-    mesh::{self, BodySurface, Figure, MeshBudget},
+    mesh::{self, BodySurface, Figure, MeshBudget, Skin},
     numbers::ShirtNumber,
     pose::Person,
     report::{Failure, FrameFigures, Loss, Progress, Stage},
+    shots::ShotList,
     teams::Member,
     trajectory::{self, Path},
 };
+
+/// Depth maps are steadied with those of this many frames before and after.
+const STEADY_FRAMES: usize = 2;
 
 /// All that the last stages need.
 pub(super) struct Scene<'a> {
@@ -44,6 +49,7 @@ pub(super) struct Scene<'a> {
     pub(super) numbers: &'a BTreeMap<PersonId, ShirtNumber>,
     pub(super) masks: &'a [FrameMasks<'a>],
     pub(super) depths: &'a Results,
+    pub(super) skins: &'a BTreeMap<PersonId, Skin>,
     pub(super) paths: &'a BTreeMap<PersonId, Path>,
     pub(super) ball: &'a [Option<BallEstimate>],
     pub(super) heights_m: &'a Heights,
@@ -69,13 +75,21 @@ impl Run<'_> {
             || Ok(()),
             |(), frame| {
                 let camera = scene.cameras.get(frame.index).and_then(|estimate| estimate.camera);
-                let depths: BTreeMap<u32, PersonDepth> = scene.depths.load(frame.index).unwrap_or_default();
+                let depths = Depths::around(scene, &self.shots, frame.index);
                 let mut lifted = Vec::new();
                 for (id, found, _) in of_frame(frame.index, scene.masks, scene.people) {
-                    if let (Some(camera), Some(Ok(map))) = (&camera, depths.get(&id.0)) {
+                    if let (Some(camera), Some(map)) = (&camera, depths.steadied(scene, id)) {
                         let above_ground_m = scene.heights_m.get(&(frame.index, id)).copied().unwrap_or(0.0);
                         let figure = Figure { person: id, frame: frame.index, above_ground_m };
-                        let body = mesh::lift(&frame.image, camera, figure, found, map, &budget);
+                        let body = mesh::lift(
+                            &frame.image,
+                            camera,
+                            figure,
+                            found,
+                            &map,
+                            scene.skins.get(&id),
+                            &budget,
+                        );
                         lifted.push((id, body.map_err(|error| error.to_string())));
                     }
                 }
@@ -163,6 +177,36 @@ impl Run<'_> {
                 }
             })
             .collect()
+    }
+}
+
+/// The depth maps of a frame and of those around it.
+struct Depths {
+    index: usize,
+    frames: BTreeMap<usize, BTreeMap<u32, PersonDepth>>,
+}
+
+impl Depths {
+    /// Frames of another shot are of another camera.
+    fn around(scene: &Scene<'_>, shots: &ShotList, index: usize) -> Self {
+        let own_shot = shots.shot_of(index);
+        let frames = index.saturating_sub(STEADY_FRAMES)..=index + STEADY_FRAMES;
+        let frames = frames.filter(|&frame| shots.shot_of(frame) == own_shot);
+        Self { index, frames: frames.filter_map(|frame| Some((frame, scene.depths.load(frame)?))).collect() }
+    }
+
+    /// The steadied depth map of somebody; `None` when there is none in this frame.
+    fn steadied(&self, scene: &Scene<'_>, id: PersonId) -> Option<DepthMap> {
+        let moments = self.frames.iter().filter_map(|(&frame, maps)| {
+            let map = maps.get(&id.0)?.as_ref().ok()?;
+            let camera = scene.cameras.get(frame)?.camera?;
+            let person_index = scene.masks.get(frame)?.get(&id)?.sighting.person_index;
+            let person = scene.people.get(frame)?.get(person_index)?;
+            let view = View::from_camera(&camera, person.ground_m)?;
+            Some(Moment { steps: frame as i32 - self.index as i32, map, joints: &person.joints, view })
+        });
+        let (own, others): (Vec<Moment<'_>>, Vec<Moment<'_>>) = moments.partition(|moment| moment.steps == 0);
+        own.first().map(|own| depth::steady(own, &others))
     }
 }
 

@@ -34,8 +34,12 @@ pub enum Stage {
     Ball,
     /// Which pixels belong to whom.
     Segmentation,
+    /// Joints in space of each player.
+    Lifting,
     /// Depth map of each player.
     Depth,
+    /// What each player looks like all round.
+    Skin,
     /// Textured mesh of each player.
     Mesh,
     /// Smooth paths.
@@ -46,7 +50,7 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::Ingest,
         Self::Detection,
         Self::Calibration,
@@ -56,7 +60,9 @@ impl Stage {
         Self::Jumps,
         Self::Ball,
         Self::Segmentation,
+        Self::Lifting,
         Self::Depth,
+        Self::Skin,
         Self::Mesh,
         Self::Trajectory,
         Self::Encode,
@@ -75,7 +81,9 @@ impl Stage {
             Self::Jumps => "jumps",
             Self::Ball => "ball",
             Self::Segmentation => "segmentation",
+            Self::Lifting => "lifting",
             Self::Depth => "depth",
+            Self::Skin => "skin",
             Self::Mesh => "mesh",
             Self::Trajectory => "trajectory",
             Self::Encode => "encode",

@@ -21,6 +21,9 @@ use crate::{
     sensor::Sensor,
 };
 
+/// Share of training players who do two things at once.
+const MIXED: f64 = 0.5;
+
 /// One line of `meta.jsonl`.
 #[derive(Clone, Debug, Serialize)]
 pub struct SampleMeta {
@@ -28,7 +31,7 @@ pub struct SampleMeta {
     pub index: usize,
     /// Seed of the sample.
     pub seed: u64,
-    /// Motion clip or formula.
+    /// Motion clip or formula; two of them, joined by `+`, when the player does both.
     pub motion: String,
     /// Share of the motion 0..1.
     pub phase: f32,
@@ -90,16 +93,21 @@ pub fn aim(size_px: (u32, u32), focal_px: f64, position: DVec3, target: DVec3, p
     camera
 }
 
-fn draw_pose(actions: &[Action<'_>], rng: &mut Pcg64Mcg) -> (String, f32, Pose) {
+fn draw_pose(actions: &[Action<'_>], split: Split, rng: &mut Pcg64Mcg) -> (String, f32, Pose) {
     let phase = rng.random_range(0.0..1.0);
     let mood = rng.random_range(0.0..1.0);
-    match gait::draw(actions, rng) {
-        Some(action) => {
-            let strength = if rng.random_bool(0.8) { 1.0 } else { 0.0 };
-            (action.name.clone(), phase, gait::personal(action.pose(phase, mood), strength, rng))
-        }
-        None => ("none".into(), 0.0, Pose::default()),
+    let Some(action) = gait::draw(actions, rng) else { return ("none".into(), 0.0, Pose::default()) };
+    let strength = if rng.random_bool(0.8) { 1.0 } else { 0.0 };
+    let (mut name, mut pose) = (action.name.clone(), action.pose(phase, mood));
+    if split == Split::Train
+        && rng.random_bool(MIXED)
+        && let Some(other) = gait::draw(actions, rng)
+    {
+        let other_pose = other.pose(rng.random_range(0.0..1.0), rng.random_range(0.0..1.0));
+        pose = gait::mixed(&pose, &other_pose, rng);
+        name = format!("{name}+{}", other.name);
     }
+    (name, phase, gait::personal(pose, strength, rng))
 }
 
 /// Renders one sample.
@@ -113,7 +121,7 @@ pub(super) fn draw(
     let rng = &mut rng(options.seed, &[9, index as u64]);
     let stadium = &cast.stadiums[rng.random_range(0..cast.stadiums.len())];
     let main = rng.random_range(0..cast.figures.len());
-    let (motion, phase, pose) = draw_pose(actions, rng);
+    let (motion, phase, pose) = draw_pose(actions, options.split, rng);
 
     // Where the player stands and where the camera is.
     let (position, anchor) = loop {
@@ -142,7 +150,7 @@ pub(super) fn draw(
     if rng.random_bool(0.4) {
         for _ in 0..rng.random_range(1..3) {
             let other = rng.random_range(0..cast.figures.len());
-            let (_, _, pose) = draw_pose(actions, rng);
+            let (_, _, pose) = draw_pose(actions, options.split, rng);
             let (away, around) =
                 (rng.random_range(0.55..2.6f32), rng.random_range(0.0..std::f32::consts::TAU));
             let place = Placement {

@@ -137,7 +137,7 @@ pub fn stream_frame(
             let id = person.id as usize;
             let anchor = fixture.anchor_m(id, truth.frame);
             let mesh = reduced[id].mesh(&scene.actors[id].posed.positions, anchor);
-            Body { person: PersonId(person.id), anchor_m: anchor, mesh }
+            Body { person: PersonId(person.id), anchor_m: anchor, mesh, guessed_from_u: None }
         })
         .collect();
     ChunkFrame {

@@ -14,8 +14,9 @@ use holopitch_tests::{
 };
 use image::RgbaImage;
 use player::{
-    camera::{CameraFile, Preset, ViewCamera},
+    camera::{CameraFile, Preset, ViewCamera, turntable},
     offscreen::Offscreen,
+    renderer::Guessed,
     scene::{FrameScene, Stage},
 };
 use protocol::{chunk::ChunkFrame, limits::Limits, pitch::Pitch, sample};
@@ -99,6 +100,32 @@ fn reconstructed_players_up_close() {
     };
     let drawn = draw(&gpu, &frame, &camera.view(ASPECT));
     Snapshot::new("reconstructed", drawn).matches_within(MEAN, WORST_BLOCK);
+}
+
+/// A reconstructed player walked round: half of it no camera saw.
+#[test]
+fn a_reconstructed_player_on_a_turntable() {
+    let Some(gpu) = software_adapter() else { return };
+    Snapshot::new("turntable", round(&gpu, Guessed::Solid)).matches_within(MEAN, WORST_BLOCK);
+    Snapshot::new("turntable-ghosted", round(&gpu, Guessed::Ghosted)).matches_within(MEAN, WORST_BLOCK);
+}
+
+fn round(gpu: &Offscreen, guessed: Guessed) -> RgbaImage {
+    const VIEW_PX: (u32, u32) = (120, 160);
+    let frame = excerpt::frame();
+    let scene = FrameScene::new(&frame, &[], &Limits::default()).unwrap();
+    let camera = frame.camera.unwrap();
+    let nearest = frame
+        .bodies
+        .iter()
+        .min_by(|a, b| camera.depth(a.anchor_m.as_dvec3()).total_cmp(&camera.depth(b.anchor_m.as_dvec3())));
+    let views = turntable(nearest.unwrap().anchor_m.as_dvec3(), Some(&camera), 6, 0.75);
+    let mut picture = RgbaImage::new(VIEW_PX.0 * 6, VIEW_PX.1);
+    for (place, view) in views.iter().enumerate() {
+        let drawn = gpu.picture_with(&Stage::new(Pitch::default()), &scene, view, guessed, VIEW_PX).unwrap();
+        image::imageops::replace(&mut picture, &drawn, place as i64 * i64::from(VIEW_PX.0), 0);
+    }
+    picture
 }
 
 /// The bounds are worth something: a person who is missing, half a metre off, or drawn without their texture shows.

@@ -19,7 +19,7 @@ use super::{
     planes::{Point, squares},
 };
 use crate::{
-    depth::{DepthError, DepthEstimator},
+    depth::{DepthError, DepthEstimator, PoseLifter},
     geometry::{Mask, PixelBox},
     pose::{PoseError, PoseEstimator},
     segmentation::{FrameSeen, PlayerMask, RefiningSegmenter, SegmentationError, Segmenter},
@@ -86,6 +86,7 @@ pub enum DepthEvaluationError {
 struct Networks {
     pose: PoseEstimator,
     masks: RefiningSegmenter,
+    lifter: PoseLifter,
     depth: DepthEstimator,
 }
 
@@ -97,6 +98,7 @@ pub fn depth(data: &Path, progress: impl Fn(usize)) -> Result<DepthReport, Depth
     let mut networks = Networks {
         pose: PoseEstimator::load()?,
         masks: RefiningSegmenter::load()?,
+        lifter: PoseLifter::load()?,
         depth: DepthEstimator::load()?,
     };
     let (mut all, mut failed) = (Tally::default(), 0usize);
@@ -154,7 +156,10 @@ fn measure(
     let (Some(person), Some(PlayerMask { mask, .. })) = (people.first(), masks.first()) else {
         return Ok(None);
     };
-    let surface = match networks.depth.surface(&sample.image, sample.view, &person.joints, mask) {
+    let Networks { lifter, depth, .. } = networks;
+    let (image, view) = (&sample.image, sample.view);
+    let surface = lifter.lift(image, view, &person.joints, mask);
+    let surface = match surface.and_then(|joints| depth.surface(image, view, &joints, mask)) {
         Ok(surface) => surface,
         Err(error @ DepthError::Inference(_)) => return Err(error.into()),
         Err(_) => return Ok(None),
