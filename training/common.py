@@ -81,6 +81,20 @@ def rate_at(highest, part, step, warm_up):
     return highest * min(1.0, (step + 1) / warm_up) * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * part)))
 
 
+def descend(network, optimizer, loss, longest=5.0):
+    """One step down the gradient, which is shortened to `longest`."""
+    optimizer.zero_grad(set_to_none=True)
+    loss.backward()
+    torch.nn.utils.clip_grad_norm_(network.parameters(), longest)
+    optimizer.step()
+
+
+def keep(out, network, average):
+    """Writes the weights and their running average."""
+    torch.save(average.state_dict(), out / "average.pt")
+    torch.save(network.state_dict(), out / "network.pt")
+
+
 @torch.no_grad()
 def average_in(average, network, step, keep):
     """Moves the averaged weights towards the network's, by 1 − `keep` and by more in the first steps."""

@@ -15,7 +15,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, batches, begin, curve_of, parser_of, rate_at, settle, with_average
+from common import average_in, batches, begin, curve_of, descend, keep, parser_of, rate_at, settle, with_average
 from dataset import OUTSIDE
 from hourglass import HourglassNetwork
 from network import DepthNetwork, read_out
@@ -158,19 +158,14 @@ def main():
             figures = validate(average, validation, arguments.validated)
             curve.writerow([f"{elapsed:.0f}", seen, *(f"{value:.4f}" for value in (running or 0, *figures))])
             print(f"{elapsed:.0f} s, {seen} of {len(data)} samples, loss {running or 0:.3f}, rmse {figures[0]:.4f} back {figures[1]:.4f} (flat {figures[2]:.4f}), mask IoU {figures[3]:.3f}", flush=True)
-            torch.save(average.state_dict(), out / "average.pt")
-            torch.save(network.state_dict(), out / "network.pt")
+            keep(out, network, average)
         if part >= 1.0:
             break
-        rate = rate_at(arguments.rate, part, steps, warm_up=200)
         for group in optimizer.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate_at(arguments.rate, part, steps, warm_up=200)
         picture, pose, *truth = next(supply)
         loss = loss_of(network(picture.contiguous(memory_format=torch.channels_last), pose), *truth)
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimizer.step()
+        descend(network, optimizer, loss)
         steps += 1
         seen += BATCH
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()

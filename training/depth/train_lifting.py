@@ -14,7 +14,7 @@ import torch
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, batches, begin, curve_of, parser_of, rate_at, with_average
+from common import average_in, batches, begin, curve_of, descend, keep, parser_of, rate_at, with_average
 from lifting import JOINTS, MIRROR, TAUGHT, LiftingNetwork, normal
 from prepare import MARGIN, POSE_STEP
 from train import recolour
@@ -117,8 +117,7 @@ def main():
             figures = errors(average, held)
             curve.writerow([f"{elapsed:.0f}", seen, *(f"{value:.4f}" for value in (running or 0, *figures))])
             print(f"{elapsed:.0f} s, {seen} of {len(data)} samples, loss {running or 0:.3f}, depth rmse {figures[0]:.4f} place {figures[1]:.4f} depth {figures[2]:.4f} (pose network {figures[3]:.4f} {figures[4]:.4f})", flush=True)
-            torch.save(average.state_dict(), out / "average.pt")
-            torch.save(network.state_dict(), out / "network.pt")
+            keep(out, network, average)
         if part >= 1.0:
             break
         for group in optimizer.param_groups:
@@ -127,10 +126,7 @@ def main():
         told = network.told(picture, pose, joints).reshape(-1, JOINTS, 3)
         error = (told - truth)[:, TAUGHT].abs()
         loss = (error + error.square() / SQUARE_M).mean()
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimizer.step()
+        descend(network, optimizer, loss)
         steps += 1
         seen += len(truth)
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()

@@ -13,7 +13,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, begin, curve_of, parser_of, rate_at, settle, with_average
+from common import average_in, begin, curve_of, descend, keep, parser_of, rate_at, settle, with_average
 from network import MaskNetwork
 
 BATCH = 16
@@ -116,8 +116,7 @@ def main():
                 f"overlapping {found[2]:.4f} ({found[3]:.4f})",
                 flush=True,
             )
-            torch.save(average.state_dict(), out / "average.pt")
-            torch.save(network.state_dict(), out / "network.pt")
+            keep(out, network, average)
         if part >= 1.0:
             break
         for group in optimizer.param_groups:
@@ -127,10 +126,7 @@ def main():
         chosen = [order.pop() for _ in range(BATCH)]
         x, y = varied(windows[chosen], masks[chosen], rng)
         loss = loss_of(network(x), y)
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimizer.step()
+        descend(network, optimizer, loss)
         steps += 1
         average_in(average, network, steps, AVERAGE)
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()

@@ -16,7 +16,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, rate_at, settle
+from common import average_in, descend, rate_at, settle
 from network import NumberNetwork, split
 from paint import colours, glyphs
 from view import CELLS
@@ -246,10 +246,7 @@ def main():
             group["lr"] = rate_at(arguments.rate, part, steps, warm_up=60)
         windows, numbers, heights = patches.draw(BATCH, rng)
         loss = loss_of(network(varied(windows, heights, rng)), numbers)
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimizer.step()
+        descend(network, optimizer, loss)
         steps += 1
         average_in(average, network, steps, AVERAGE)
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()

@@ -16,7 +16,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, batches, begin, curve_of, parser_of, rate_at, with_average
+from common import average_in, batches, begin, curve_of, descend, keep, parser_of, rate_at, with_average
 from dataset import Frames, sample, targets, whole
 from network import BALL_STRIDE, BINS, ROLES, STRIDE, PeopleNetwork, distances, start_from_exported, start_from_nanodet
 
@@ -210,8 +210,7 @@ def main():
             figures = validate(average, watched)
             curve.writerow([f"{elapsed:.0f}", seen, *(f"{value:.4f}" for value in [*(running or (0, 0)), *figures])])
             print(f"{elapsed:.0f} s, {seen} samples, people found {figures[0]:.3f} right {figures[1]:.3f} role {figures[2]:.3f}, ball found {figures[3]:.3f} right {figures[4]:.3f}", flush=True)
-            torch.save(average.state_dict(), out / "average.pt")
-            torch.save(network.state_dict(), out / "network.pt")
+            keep(out, network, average)
         if part >= 1.0:
             break
         for group in optimizer.param_groups:
@@ -219,10 +218,7 @@ def main():
         samples = next(supply)
         people, ball = network(stack(samples))
         people_loss, ball_loss = loss_of(people, ball, samples)
-        optimizer.zero_grad(set_to_none=True)
-        (people_loss + 0.5 * ball_loss).backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 10.0)
-        optimizer.step()
+        descend(network, optimizer, people_loss + 0.5 * ball_loss, longest=10.0)
         steps += 1
         seen += BATCH
         now = people_loss.item(), ball_loss.item()

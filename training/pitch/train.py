@@ -17,7 +17,7 @@ from torch.nn import functional
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # behind this folder: names are the same in both
 
-from common import average_in, batches, begin, curve_of, parser_of, rate_at, settle, with_average
+from common import average_in, batches, begin, curve_of, descend, keep, parser_of, rate_at, settle, with_average
 from dataset import Frames
 from network import PitchNetwork
 from points import CHANNELS, POINTS
@@ -93,8 +93,7 @@ def main():
             recall, precision, overlap = validate(average, validation)
             curve.writerow([f"{elapsed:.0f}", seen, f"{running or 0:.4f}", f"{recall:.4f}", f"{precision:.4f}", f"{overlap:.4f}"])
             print(f"{elapsed:.0f} s, {seen} samples, loss {running or 0:.3f}, points found {recall:.3f}, right {precision:.3f}, lines {overlap:.3f}", flush=True)
-            torch.save(average.state_dict(), out / "average.pt")
-            torch.save(network.state_dict(), out / "network.pt")
+            keep(out, network, average)
         if part >= 1.0:
             break
         rate = rate_at(arguments.rate, part, steps, warm_up=150)
@@ -102,10 +101,7 @@ def main():
             group["lr"] = rate
         pictures, maps = next(supply)
         loss = loss_of(network(pictures), maps)
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimizer.step()
+        descend(network, optimizer, loss)
         steps += 1
         seen += BATCH
         running = loss.item() if running is None else 0.98 * running + 0.02 * loss.item()

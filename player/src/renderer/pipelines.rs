@@ -206,7 +206,7 @@ pub(super) fn build(
             compilation_options: Default::default(),
             buffers: if kind.stride == 0 { &[] } else { &buffers },
         },
-        // Reconstructed people are open surfaces: both sides are drawn.
+        // People without what is guessed of them are open surfaces: both sides are drawn.
         primitive: PrimitiveState { topology: kind.topology, cull_mode: None, ..Default::default() },
         depth_stencil: Some(DepthStencilState {
             format: DEPTH_FORMAT,

@@ -104,14 +104,41 @@ impl DepthMap {
 
     /// Coverage 0..255 between the middles of cells.
     fn coverage_at(&self, pixel: DVec2) -> f64 {
+        self.corners(pixel).map(|([x, y], share)| share * f64::from(self.covered(x, y))).iter().sum()
+    }
+
+    /// Both surfaces between the middles of cells, metres from the upright plane, of those cells that are the player's; `None` where most
+    /// is not.
+    #[must_use]
+    pub fn surfaces_at(&self, pixel: DVec2) -> Option<[f64; 2]> {
+        let (mut sums, mut weight) = ([0.0; 2], 0.0);
+        for ([x, y], share) in self.corners(pixel) {
+            if let Some(surfaces_m) = self.surfaces_m(x, y) {
+                sums = [0, 1].map(|side| sums[side] + share * surfaces_m[side]);
+                weight += share;
+            }
+        }
+        (weight > 0.5).then(|| sums.map(|sum| sum / weight))
+    }
+
+    /// The four cells (column, row) around a pixel and the share of each.
+    fn corners(&self, pixel: DVec2) -> [([i64; 2], f64); 4] {
         let place = self.place(pixel);
         let low = place.floor();
         let t = place - low;
-        let (x, y) = (low.x as i64, low.y as i64);
-        let at = |dx: i64, dy: i64| f64::from(self.covered(x + dx, y + dy));
-        let rows = [0, 1].map(|dy| at(0, dy) * (1.0 - t.x) + at(1, dy) * t.x);
-        rows[0] * (1.0 - t.y) + rows[1] * t.y
+        let share = |dx: i64, dy: i64| {
+            let along = |step: i64, t: f64| if step == 1 { t } else { 1.0 - t };
+            along(dx, t.x) * along(dy, t.y)
+        };
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| {
+            ([(low.x as i64).saturating_add(dx), (low.y as i64).saturating_add(dy)], share(dx, dy))
+        })
     }
+}
+
+/// Metres as a map stores them.
+pub(super) fn millimetres(metres: f64) -> i16 {
+    (1000.0 * metres).round().clamp(-32_000.0, 32_000.0) as i16
 }
 
 #[cfg(test)]

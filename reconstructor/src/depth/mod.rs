@@ -25,7 +25,7 @@ use crate::{
 pub use lifting::{LIFTING_MODEL, PoseLifter};
 pub use map::DepthMap;
 pub use paint::View;
-pub(crate) use paint::{LAST_TRUNK_LIMB, LIMBS, with_middles};
+pub(crate) use paint::{LAST_TRUNK_LIMB, LIMBS};
 pub(crate) use skeleton::{Place, Side, Skeleton};
 pub use steady::{Moment, steady};
 pub use surface::WindowSurface;

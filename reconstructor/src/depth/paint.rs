@@ -113,7 +113,7 @@ pub(super) fn paint(joints: &[Joint], window: &Window, view: View) -> Option<Vec
 
 /// The joints and after them the middles of the shoulders and of the hips, which [`LIMBS`] names too. `None` unless there are
 /// [`JOINTS`] joints.
-pub(crate) fn with_middles(joints: &[Joint]) -> Option<Vec<Joint>> {
+pub(super) fn with_middles(joints: &[Joint]) -> Option<Vec<Joint>> {
     if joints.len() != JOINTS {
         return None;
     }

@@ -36,7 +36,8 @@ impl Sight {
                 found: mask.coverage.len(),
             });
         }
-        let usable = joints.iter().filter(|j| j.pixel.is_finite() && j.depth_m.is_finite()).count();
+        let finite = |j: &&Joint| j.pixel.is_finite() && j.depth_m.is_finite() && j.visibility.is_finite();
+        let usable = joints.iter().filter(finite).count();
         let broken_pose = DepthError::BrokenPose { found: usable };
         if usable != joints.len() {
             return Err(broken_pose);

@@ -42,12 +42,14 @@ pub(crate) struct Place {
 }
 
 /// A limb in the picture: pixels, and metres behind the upright plane through the hips.
-struct Limb {
+pub(crate) struct Limb {
     from_px: DVec2,
     to_px: DVec2,
     from_m: f64,
     to_m: f64,
-    radius_m: f64,
+    pub(crate) radius_m: f64,
+    /// Whether it reaches farther along the sight than across it.
+    pub(crate) along_sight: bool,
     /// Direction in the picture, when it has one.
     direction: Option<DVec2>,
 }
@@ -72,8 +74,10 @@ impl Skeleton {
             let axis = to.pixel - from.pixel;
             let direction = (axis.length() > SHORT_M * pixels_per_metre).then(|| axis.normalize());
             let (from_m, to_m) = (plane_m(from), plane_m(to));
+            let along_sight = f64::from(to.depth_m - from.depth_m).abs() > axis.length() / pixels_per_metre;
             let finite = from.pixel.is_finite() && to.pixel.is_finite() && (from_m + to_m).is_finite();
-            finite.then_some(Limb { from_px: from.pixel, to_px: to.pixel, from_m, to_m, radius_m, direction })
+            let (from_px, to_px) = (from.pixel, to.pixel);
+            finite.then_some(Limb { from_px, to_px, from_m, to_m, radius_m, along_sight, direction })
         });
         let limbs: Option<Vec<Limb>> = limbs.collect();
         let scale = pixels_per_metre.is_finite() && pixels_per_metre > 0.0;
@@ -99,6 +103,11 @@ impl Skeleton {
         Some(Place { limb: index, along, beside_m, limb_m: limb.depth_m(along) })
     }
 
+    /// The limbs, in the order of [`LIMBS`].
+    pub(crate) fn limbs(&self) -> &[Limb] {
+        &self.limbs
+    }
+
     /// A point of a limb's axis, pixels.
     pub(crate) fn at(&self, limb: usize, along: f64) -> Option<DVec2> {
         Some(self.limbs.get(limb)?.at(along))
@@ -119,11 +128,13 @@ impl Skeleton {
 }
 
 impl Limb {
-    fn at(&self, along: f64) -> DVec2 {
+    /// A point of its axis, pixels.
+    pub(crate) fn at(&self, along: f64) -> DVec2 {
         self.from_px.lerp(self.to_px, along)
     }
 
-    fn depth_m(&self, along: f64) -> f64 {
+    /// How far behind the plane the point is, metres.
+    pub(crate) fn depth_m(&self, along: f64) -> f64 {
         self.from_m + along * (self.to_m - self.from_m)
     }
 }

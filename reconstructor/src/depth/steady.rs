@@ -8,6 +8,7 @@ use glam::DVec2;
 
 use super::{
     DepthMap, View,
+    map::millimetres,
     skeleton::{Side, Skeleton},
 };
 use crate::pose::Joint;
@@ -56,7 +57,7 @@ pub fn steady(own: &Moment<'_>, around: &[Moment<'_>]) -> DepthMap {
         }
         for (moment, skeleton) in &others {
             let Some((pixel, limb_m)) = skeleton.pixel(&place) else { continue };
-            let Some(there_m) = surfaces_at(moment.map, pixel) else { continue };
+            let Some(there_m) = moment.map.surfaces_at(pixel) else { continue };
             let weight = STEP_WEIGHT.powi(moment.steps.abs());
             for (values, there_m) in values.iter_mut().zip(there_m) {
                 values.push((there_m - limb_m + place.limb_m, weight));
@@ -84,26 +85,6 @@ fn middle(values: &mut [(f64, f64)]) -> f64 {
     let (sum, weight) =
         near.fold((0.0, 0.0), |(sum, all), (value, weight)| (sum + value * weight, all + weight));
     if weight > 0.0 { sum / weight } else { median }
-}
-
-fn millimetres(metres: f64) -> i16 {
-    (1000.0 * metres).round().clamp(-32_000.0, 32_000.0) as i16
-}
-
-/// Both surfaces between the middles of cells, of those that are the player's.
-fn surfaces_at(map: &DepthMap, pixel: DVec2) -> Option<[f64; 2]> {
-    let place = map.place(pixel);
-    let low = place.floor();
-    let t = place - low;
-    let (mut sums, mut weight) = ([0.0; 2], 0.0);
-    for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let share = (if dx == 1 { t.x } else { 1.0 - t.x }) * (if dy == 1 { t.y } else { 1.0 - t.y });
-        if let Some(surfaces) = map.surfaces_m(low.x as i64 + dx, low.y as i64 + dy) {
-            sums = [0, 1].map(|side| sums[side] + share * surfaces[side]);
-            weight += share;
-        }
-    }
-    (weight > 0.5).then(|| sums.map(|sum| sum / weight))
 }
 
 #[cfg(test)]

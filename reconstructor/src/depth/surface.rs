@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{
     DepthMap,
+    map::millimetres,
     window::{PICTURE_SIZE, Window},
 };
 use crate::geometry::Mask;
@@ -93,7 +94,6 @@ impl WindowSurface {
             height: height as u32,
             ..DepthMap::default()
         };
-        let millimetres = |metres: f64| (1000.0 * metres).round().clamp(-32_000.0, 32_000.0) as i16;
         for i in (0..height).flat_map(|y| (0..width).map(move |x| (y + y0) * PICTURE_SIZE + x + x0)) {
             let kept = coverage.get(i).copied().unwrap_or(0);
             map.coverage.push(kept);

@@ -78,6 +78,7 @@ fn frame(index: u32, people: u32) -> StreamFrame {
                 texture: RgbImage::from_pixel(40, 90, colour(body.person)),
                 guessed_from_u: 0.5,
                 confidence: 1.0,
+                clustered: false,
             })
             .collect(),
     }

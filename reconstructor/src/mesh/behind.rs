@@ -5,14 +5,11 @@ use glam::DVec2;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use imageproc::distance_transform::{Norm, distance_transform};
 
-use protocol::camera::Camera;
-
 use super::{
     skin::{Skin, Wearer},
     texture::CutOut,
 };
 use crate::{
-    depth::{DepthMap, View},
     geometry::Mask,
     pose::{Person, index},
 };
@@ -79,17 +76,7 @@ pub(super) fn colours(seen: &CutOut, mask: &Mask, person: &Person, pixels_per_me
 }
 
 /// Lays what was seen of the far side at other times over the guess.
-pub(super) fn paint_seen(
-    guessed: &mut RgbImage,
-    seen: &CutOut,
-    skin: &Skin,
-    camera: &Camera,
-    person: &Person,
-    depth: &DepthMap,
-) {
-    let wearer =
-        View::from_camera(camera, person.ground_m).and_then(|view| Wearer::new(&person.joints, depth, view));
-    let Some(wearer) = wearer else { return };
+pub(super) fn paint_seen(guessed: &mut RgbImage, seen: &CutOut, skin: &Skin, wearer: &Wearer<'_>) {
     for (x, y, Rgb(guess)) in guessed.enumerate_pixels_mut() {
         let pixel = DVec2::new(f64::from(seen.x0) + f64::from(x), f64::from(seen.y0) + f64::from(y));
         if let Some((colour, sure)) = wearer.far_side(skin, pixel) {

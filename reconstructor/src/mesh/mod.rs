@@ -18,10 +18,7 @@ use image::RgbImage;
 use protocol::{camera::Camera, manifest::PersonId, mesh::Mesh};
 use thiserror::Error;
 
-use crate::{
-    depth::{DepthMap, View},
-    pose::Person,
-};
+use crate::{depth::DepthMap, pose::Person};
 
 pub use contact::MAX_CORRECTION_M;
 pub use skin::{Skin, SkinSample};
@@ -43,6 +40,8 @@ pub struct BodySurface {
     pub guessed_from_u: f32,
     /// 0..1.
     pub confidence: f32,
+    /// Whether it was so hard to simplify that it may not be closed any more.
+    pub clustered: bool,
 }
 
 /// Whose surface is lifted.
@@ -150,9 +149,7 @@ impl VirtualPlane {
 /// What a frame shows of a person, for the [`Skin`] that [`lift`] takes; nothing when the pose does not tell where the person faces.
 #[must_use]
 pub fn skin_of(image: &RgbImage, camera: &Camera, person: &Person, depth: &DepthMap) -> Vec<SkinSample> {
-    let wearer = View::from_camera(camera, person.ground_m)
-        .and_then(|view| skin::Wearer::new(&person.joints, depth, view));
-    wearer.map(|wearer| wearer.samples(image)).unwrap_or_default()
+    skin::Wearer::new(person, camera, depth).map(|wearer| wearer.samples(image)).unwrap_or_default()
 }
 
 /// Lifts a player to a closed textured mesh on the pitch.
@@ -180,14 +177,18 @@ pub fn lift(
     surface.keep_large()?;
     let correction_m =
         contact::correction(&surface.points_m, person, &plane, footprint_m, figure.above_ground_m);
-    surface.simplify(budget.triangles);
+    let clustered = surface.simplify(budget.triangles);
+    if surface.triangles.is_empty() {
+        // A budget that no body fits in.
+        return Err(MeshError::TooSmall { triangles: 0 });
+    }
     let mask = depth.mask();
     let pixels: Option<Vec<DVec2>> = surface.points_m.iter().map(|point| camera.project(*point)).collect();
     let pixels = pixels.ok_or(MeshError::NoPlane)?;
     let seen = texture::cut_out(image, &mask, &pixels);
     let mut guessed = behind::colours(&seen, &mask, person, 1.0 / footprint_m);
-    if let Some(skin) = skin {
-        behind::paint_seen(&mut guessed, &seen, skin, camera, person, depth);
+    if let (Some(skin), Some(wearer)) = (skin, skin::Wearer::new(person, camera, depth)) {
+        behind::paint_seen(&mut guessed, &seen, skin, &wearer);
     }
     behind::blend(&mut guessed, &seen, &mask, 1.0 / footprint_m);
     let charts = charts::split(&surface, &pixels, depth, &plane, &seen);
@@ -205,6 +206,7 @@ pub fn lift(
         texture: texture::side_by_side(&seen.image, &guessed),
         guessed_from_u: charts::GUESSED_FROM_U,
         confidence: person.pose_score.clamp(0.0, 1.0),
+        clustered,
     })
 }
 

@@ -38,10 +38,29 @@ pub(super) fn lifted(net: &Net, volume: &Volume, depth: &DepthMap, plane: &Virtu
 }
 
 impl Surface {
-    /// Fewer triangles, as many as the budget allows.
-    pub(super) fn simplify(&mut self, triangles: usize) {
-        let (points_m, triangles) = decimate::to_budget(&self.points_m, &self.triangles, triangles);
-        (self.points_m, self.triangles) = (points_m, triangles);
+    /// Fewer triangles, as many as the budget allows. Says whether the surface may have lost its closedness.
+    pub(super) fn simplify(&mut self, triangles: usize) -> bool {
+        let simplified = decimate::to_budget(&self.points_m, &self.triangles, triangles);
+        self.keep(&simplified.triangles);
+        simplified.clustered
+    }
+
+    /// Keeps some triangles and the points they use, in order of first use.
+    fn keep(&mut self, triangles: &[[u32; 3]]) {
+        let mut new_index = vec![u32::MAX; self.points_m.len()];
+        let mut points_m = Vec::new();
+        let kept = triangles.iter().map(|triangle| {
+            triangle.map(|old| {
+                let old = old as usize;
+                if new_index[old] == u32::MAX {
+                    new_index[old] = points_m.len() as u32;
+                    points_m.push(self.points_m[old]);
+                }
+                new_index[old]
+            })
+        });
+        self.triangles = kept.collect();
+        self.points_m = points_m;
     }
 
     /// Drops the pieces that are small beside the largest one, and every point that no triangle uses.
@@ -66,22 +85,7 @@ impl Surface {
         let least = (largest as f64 * PIECE_SHARE).ceil() as usize;
         let kept = self.triangles.iter().zip(&pieces).filter(|(_, piece)| sizes[*piece] >= least.max(4));
         let kept: Vec<[u32; 3]> = kept.map(|(triangle, _)| *triangle).collect();
-        let mut new_index = vec![u32::MAX; self.points_m.len()];
-        let mut points_m = Vec::new();
-        self.triangles = kept
-            .iter()
-            .map(|triangle| {
-                triangle.map(|old| {
-                    let old = old as usize;
-                    if new_index[old] == u32::MAX {
-                        new_index[old] = points_m.len() as u32;
-                        points_m.push(self.points_m[old]);
-                    }
-                    new_index[old]
-                })
-            })
-            .collect();
-        self.points_m = points_m;
+        self.keep(&kept);
         Ok(())
     }
 }

@@ -8,10 +8,11 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 use image::RgbImage;
+use protocol::camera::Camera;
 
 use crate::{
     depth::{DepthMap, LAST_TRUNK_LIMB, LIMBS, Place, Side, Skeleton, View},
-    pose::{Joint, index},
+    pose::{Joint, Person, index},
 };
 
 /// A part of the body with cells of its own.
@@ -121,7 +122,11 @@ pub(super) struct Wearer<'a> {
 
 impl<'a> Wearer<'a> {
     /// `None` when the pose does not tell where the person faces.
-    pub(super) fn new(joints: &[Joint], depth: &'a DepthMap, view: View) -> Option<Self> {
+    pub(super) fn new(person: &Person, camera: &Camera, depth: &'a DepthMap) -> Option<Self> {
+        Self::of(&person.joints, depth, View::from_camera(camera, person.ground_m)?)
+    }
+
+    fn of(joints: &[Joint], depth: &'a DepthMap, view: View) -> Option<Self> {
         let skeleton = Skeleton::of(joints, view)?;
         let at = |joint: usize| joints.get(joint);
         let across = |left: usize, right: usize| {
@@ -245,11 +250,11 @@ mod tests {
             RgbImage::from_fn(100, 120, |x, _| if x < 50 { Rgb([250, 0, 0]) } else { Rgb([0, 0, 250]) });
         let mut skin = Skin::default();
         for _ in 0..90 {
-            skin.add(&Wearer::new(&pose(true), &map, VIEW).unwrap().samples(&behind));
+            skin.add(&Wearer::of(&pose(true), &map, VIEW).unwrap().samples(&behind));
         }
         // Seen from the front his left is right in the picture, and so is the far side's.
         let facing = pose(false);
-        let wearer = Wearer::new(&facing, &map, VIEW).unwrap();
+        let wearer = Wearer::of(&facing, &map, VIEW).unwrap();
         let at = |x: f64, y: f64| wearer.far_side(&skin, DVec2::new(x, y)).unwrap();
         let (left, sure) = at(56.0, 45.0);
         assert!(left[0] > 200.0 && left[2] < 50.0 && sure > 0.7, "{left:?} {sure}");
@@ -265,7 +270,7 @@ mod tests {
         assert_eq!(last.first + last.along * last.around, CELLS);
         let mut edgewise = pose(false);
         edgewise.iter_mut().for_each(|joint| joint.pixel.x = 50.0);
-        assert!(Wearer::new(&edgewise, &slab(), VIEW).is_none());
-        assert!(Wearer::new(&edgewise[..7], &slab(), VIEW).is_none());
+        assert!(Wearer::of(&edgewise, &slab(), VIEW).is_none());
+        assert!(Wearer::of(&edgewise[..7], &slab(), VIEW).is_none());
     }
 }

@@ -215,6 +215,17 @@ fn triangles_face_outwards_and_the_texture_shows_no_grass() {
 }
 
 #[test]
+fn a_budget_that_no_body_fits_in_is_refused() {
+    let camera = camera();
+    let anchor_m = DVec3::new(10.0, 0.0, 8.0);
+    let (depth, image) = photograph(&camera, anchor_m, |ray| cylinder(ray, anchor_m, 0.16, 1.8));
+    assert!(!lifted(&camera, anchor_m, &depth, &image, 600).clustered);
+    let (figure, budget) = (Figure::standing(PersonId(0), 0), MeshBudget { triangles: 0 });
+    let refused = lift(&image, &camera, figure, &person_at(anchor_m), &depth, None, &budget);
+    assert!(matches!(refused, Err(MeshError::TooSmall { triangles: 0 })));
+}
+
+#[test]
 fn texture_coordinates_point_at_the_pixel_a_vertex_was_seen_in() {
     let camera = camera();
     let anchor_m = DVec3::new(10.0, 0.0, 8.0);

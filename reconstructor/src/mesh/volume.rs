@@ -9,12 +9,13 @@ use glam::{DVec2, DVec3};
 
 use super::{MeshError, VirtualPlane};
 use crate::{
-    depth::{DepthMap, LAST_TRUNK_LIMB, LIMBS, View, with_middles},
+    depth::{DepthMap, LAST_TRUNK_LIMB, Skeleton, View},
     pose::Person,
 };
 
-/// A ray that stays in the body for longer than this may have passed air, metres: where there is trunk or head, and among arms and legs.
+/// A ray that stays in the body for longer than this may have passed air, metres.
 const THICK_M: f64 = 0.34;
+/// The same where there are only arms and legs.
 const THICK_LIMB_M: f64 = 0.24;
 /// Air between parts that is thinner than this is filled, metres.
 const GAP_M: f64 = 0.06;
@@ -173,26 +174,17 @@ struct Limbs {
 impl Limbs {
     /// The limbs of a person at the distances of the surfaces: joints know their depth only from the hips.
     fn new(person: &Person, plane: &VirtualPlane, depth: &DepthMap, rays: &Rays, footprint_m: f64) -> Self {
-        let joints = with_middles(&person.joints);
         let view = View::from_camera(&plane.camera, plane.anchor_m);
-        let (Some(joints), Some(view)) = (joints, view) else {
-            return Self { balls: Vec::new(), footprint_m };
-        };
-        let hips_y_px = joints.last().map_or(0.0, |hips| hips.pixel.y);
-        let mut balls = Vec::new();
-        for (index, &(from, to, radius_m)) in LIMBS.iter().enumerate() {
-            let (Some(from), Some(to)) = (joints.get(from), joints.get(to)) else { continue };
-            let across_m = from.pixel.distance(to.pixel) * footprint_m;
-            let fills = index <= LAST_TRUNK_LIMB || f64::from(to.depth_m - from.depth_m).abs() > across_m;
-            balls.extend((0..BALLS).map(|k| {
+        let skeleton = view.and_then(|view| Skeleton::of(&person.joints, view));
+        let Some(skeleton) = skeleton else { return Self { balls: Vec::new(), footprint_m } };
+        let balls = skeleton.limbs().iter().enumerate().flat_map(|(index, limb)| {
+            let fills = index <= LAST_TRUNK_LIMB || limb.along_sight;
+            (0..BALLS).map(move |k| {
                 let share = k as f64 / (BALLS - 1) as f64;
-                let pixel = from.pixel.lerp(to.pixel, share);
-                let behind_hips_m = f64::from(from.depth_m) * (1.0 - share) + f64::from(to.depth_m) * share;
-                let slope_m = (pixel.y - hips_y_px) * footprint_m * view.descent;
-                Ball { pixel, offset_m: behind_hips_m - slope_m, radius_m, fills }
-            }));
-        }
-        balls.retain(|ball| ball.pixel.is_finite() && ball.offset_m.is_finite());
+                Ball { pixel: limb.at(share), offset_m: limb.depth_m(share), radius_m: limb.radius_m, fills }
+            })
+        });
+        let balls = balls.collect();
         let mut limbs = Self { balls, footprint_m };
         limbs.shift(depth, rays);
         limbs

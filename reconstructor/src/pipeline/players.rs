@@ -204,13 +204,8 @@ impl Run<'_> {
                 };
                 for (id, person, mask) in of_frame(frame.index, masks, seen) {
                     let view = View::from_camera(&camera, person.ground_m).ok_or(DepthError::OutOfView);
-                    let joints =
-                        match view.and_then(|view| lifter.lift(&frame.image, view, &person.joints, mask)) {
-                            Ok(joints) => Ok(joints),
-                            Err(error @ DepthError::Inference(_)) => return Err(error.into()),
-                            Err(error) => Err(error.to_string()),
-                        };
-                    all.insert(id.0, joints);
+                    let joints = view.and_then(|view| lifter.lift(&frame.image, view, &person.joints, mask));
+                    all.insert(id.0, of_one_player(joints)?);
                 }
                 Ok(all)
             },
@@ -231,7 +226,7 @@ impl Run<'_> {
                 }
             }
         }
-        trajectory::smooth_poses(people, &in_shots(tracks, &self.shots), cameras);
+        smooth_poses(people, &in_shots(tracks, &self.shots), cameras);
         Ok(())
     }
 
@@ -256,13 +251,7 @@ impl Run<'_> {
                     return Ok(all);
                 };
                 for (id, found, mask) in of_frame(frame.index, masks, people) {
-                    let map = match estimator.estimate(&frame.image, &camera, found, mask) {
-                        Ok(map) => Ok(map),
-                        // The network itself is broken: that is not this player's fault.
-                        Err(error @ DepthError::Inference(_)) => return Err(error.into()),
-                        Err(error) => Err(error.to_string()),
-                    };
-                    all.insert(id.0, map);
+                    all.insert(id.0, of_one_player(estimator.estimate(&frame.image, &camera, found, mask))?);
                 }
                 Ok(all)
             },
@@ -365,6 +354,14 @@ impl Run<'_> {
         }
         self.reporter.stage_done(Stage::Trajectory, started.elapsed(), 0);
         paths
+    }
+}
+
+/// What went wrong with one player is said of that player; a network that is broken ends the run.
+fn of_one_player<T>(result: Result<T, DepthError>) -> Result<Result<T, String>, PipelineError> {
+    match result {
+        Err(error @ DepthError::Inference(_)) => Err(error.into()),
+        result => Ok(result.map_err(|error| error.to_string())),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The last stages: meshes, moved onto their paths, into the stream, and the figures of every frame.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, btree_map::Entry},
     ops::Range,
     time::{Duration, Instant},
 };
@@ -72,10 +72,10 @@ impl Run<'_> {
             || self.clip.frames(),
             self.options.threads,
             &wanted,
-            || Ok(()),
-            |(), frame| {
+            || Ok(Depths::default()),
+            |depths, frame| {
                 let camera = scene.cameras.get(frame.index).and_then(|estimate| estimate.camera);
-                let depths = Depths::around(scene, &self.shots, frame.index);
+                depths.turn_to(frame.index, scene.depths, &self.shots);
                 let mut lifted = Vec::new();
                 for (id, found, _) in of_frame(frame.index, scene.masks, scene.people) {
                     if let (Some(camera), Some(map)) = (&camera, depths.steadied(scene, id)) {
@@ -180,19 +180,27 @@ impl Run<'_> {
     }
 }
 
-/// The depth maps of a frame and of those around it.
+/// The depth maps of a frame and of those around it; what the next frame needs, too, is not read again.
+#[derive(Default)]
 struct Depths {
     index: usize,
     frames: BTreeMap<usize, BTreeMap<u32, PersonDepth>>,
 }
 
 impl Depths {
-    /// Frames of another shot are of another camera.
-    fn around(scene: &Scene<'_>, shots: &ShotList, index: usize) -> Self {
-        let own_shot = shots.shot_of(index);
-        let frames = index.saturating_sub(STEADY_FRAMES)..=index + STEADY_FRAMES;
-        let frames = frames.filter(|&frame| shots.shot_of(frame) == own_shot);
-        Self { index, frames: frames.filter_map(|frame| Some((frame, scene.depths.load(frame)?))).collect() }
+    /// Has those of frame `index` and of its neighbours in the same shot: frames of another shot are of another camera.
+    fn turn_to(&mut self, index: usize, depths: &Results, shots: &ShotList) {
+        let shot = shots.shot_of(index);
+        let around = index.saturating_sub(STEADY_FRAMES)..=index + STEADY_FRAMES;
+        self.index = index;
+        self.frames.retain(|frame, _| around.contains(frame) && shots.shot_of(*frame) == shot);
+        for frame in around.filter(|&frame| shots.shot_of(frame) == shot) {
+            if let Entry::Vacant(place) = self.frames.entry(frame)
+                && let Some(maps) = depths.load(frame)
+            {
+                place.insert(maps);
+            }
+        }
     }
 
     /// The steadied depth map of somebody; `None` when there is none in this frame.
@@ -234,7 +242,14 @@ impl Writing {
         let mut surfaces = Vec::new();
         for (person, body) in lifted {
             match body {
-                Ok(surface) => surfaces.push(surface),
+                Ok(surface) => {
+                    if surface.clustered {
+                        let reason = "simplified by clustering: the body may not be closed".to_owned();
+                        let (stage, frame, person) = (Stage::Mesh, Some(time.clip_frame), Some(person.0));
+                        self.failures.push(Failure { stage, loss: Loss::Fallback, frame, person, reason });
+                    }
+                    surfaces.push(surface);
+                }
                 Err(reason) => self.failures.push(Failure {
                     stage: Stage::Mesh,
                     loss: Loss::LeftOut,
