@@ -83,13 +83,23 @@ fn file_advice(kind: ErrorKind) -> &'static str {
 
 fn object_advice(error: &object_store::Error) -> &'static str {
     use object_store::Error;
+    const NAME: &str = "check the name of the bucket and that the object is there";
+    const CREDENTIALS: &str = "check the credentials (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, GOOGLE_… or AZURE_…) and what they are allowed there";
     match error {
-        Error::NotFound { .. } => "check the name of the bucket and that the object is there",
-        Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => {
-            "check the credentials (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, GOOGLE_… or AZURE_…) and that they may write there"
-        }
-        _ => {
-            "check the endpoint (AWS_ENDPOINT, …), the credentials and the network, and run the command again: finished stages are kept in the work folder"
+        Error::NotFound { .. } => NAME,
+        Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => CREDENTIALS,
+        // Where the library does not tell them apart, as when listing, the storage's own words do.
+        other => {
+            let words = other.to_string();
+            let says = |codes: &[&str]| codes.iter().any(|code| words.contains(code));
+            if says(&["NoSuchBucket", "ContainerNotFound", "404 Not Found"]) {
+                NAME
+            } else if says(&["AccessDenied", "InvalidAccessKeyId", "SignatureDoesNotMatch", "403 Forbidden"])
+            {
+                CREDENTIALS
+            } else {
+                "check the endpoint (AWS_ENDPOINT, …), the credentials and the network, and run the command again: finished stages are kept in the work folder"
+            }
         }
     }
 }

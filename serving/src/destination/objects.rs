@@ -20,16 +20,16 @@ use super::{DestinationError, FileKind};
 const REQUEST_TIMEOUT: &str = "2 minutes";
 
 /// Storage that restarts or throttles is waited for this long per file.
+const PATIENCE: Duration = Duration::from_secs(60);
+
 fn retries() -> RetryConfig {
-    RetryConfig {
-        backoff: BackoffConfig {
-            init_backoff: Duration::from_millis(200),
-            max_backoff: Duration::from_secs(10),
-            base: 2.0,
-        },
-        max_retries: 12,
-        retry_timeout: Duration::from_secs(120),
-    }
+    let backoff = BackoffConfig {
+        init_backoff: Duration::from_millis(200),
+        max_backoff: Duration::from_secs(5),
+        base: 2.0,
+    };
+    // The waits are drawn at random, some are short: the time is what counts, the number only a bound.
+    RetryConfig { backoff, max_retries: 1000, retry_timeout: PATIENCE }
 }
 
 pub(super) struct Objects {

@@ -83,7 +83,14 @@ impl Server {
     /// When the folder is not a stream, the address cannot be used, or the certificate cannot.
     pub fn start(folder: &Path, options: ServeOptions) -> Result<Self, ServeError> {
         let runtime = runtime()?;
-        let (door, bound) = runtime.block_on(open(folder, options))?;
+        let (door, bound) = match open(&runtime, folder, options) {
+            Ok(open) => open,
+            Err(error) => {
+                // The caller may itself be async code, which must not wait for a runtime to end.
+                runtime.shutdown_background();
+                return Err(error);
+            }
+        };
         let (stop, stopped) = oneshot::channel();
         let thread = thread::Builder::new().name("holopitch-serve".to_owned()).spawn(move || {
             run(&runtime, door, async {
@@ -146,7 +153,7 @@ impl Bound {
 pub fn serve(folder: &Path, options: ServeOptions) -> Result<(), ServeError> {
     let runtime = runtime()?;
     let deadline_s = options.stop_deadline.as_secs_f32();
-    let (door, bound) = runtime.block_on(open(folder, options))?;
+    let (door, bound) = open(&runtime, folder, options)?;
     let url = bound.url();
     println!("serving {} at {url}", folder.display());
     if let Some(identity) = &bound.identity {
@@ -195,11 +202,12 @@ fn runtime() -> io::Result<Runtime> {
 }
 
 /// Listens, with everything that can be wrong found out before the first viewer comes.
-async fn open(folder: &Path, options: ServeOptions) -> Result<(Door, Bound), ServeError> {
+fn open(runtime: &Runtime, folder: &Path, options: ServeOptions) -> Result<(Door, Bound), ServeError> {
     if !folder.join(FILE_NAME).is_file() {
         return Err(ServeError::NotAStream { folder: folder.to_owned() });
     }
     let tls = tls::acceptor(&options.tls, options.address)?;
+    let _context = runtime.enter();
     let listen = |source| ServeError::Listen { address: options.address, source };
     let listener = listener(options.address).map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
