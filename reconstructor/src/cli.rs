@@ -5,6 +5,7 @@ use std::{net::SocketAddr, ops::Range, path::PathBuf};
 use clap::{Args, Parser, Subcommand};
 use protocol::pitch::Pitch;
 use reconstructor::{calibration::is_possible, tracking::TrackingMethod};
+use serving::server::{self, ServeOptions, Tls};
 
 /// Turns a broadcast football clip into a match that stands on a table.
 #[derive(Debug, Parser)]
@@ -35,7 +36,9 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Evaluate(Evaluate),
     /// Serve a stream over HTTP until Ctrl-C.
-    #[command(after_help = "Example:\n  reconstructor serve stream --listen 127.0.0.1:8420")]
+    #[command(
+        after_help = "Examples:\n  reconstructor serve stream --listen 127.0.0.1:8420\n  reconstructor serve stream --listen 0.0.0.0:8420 --tls-cert cert.pem --tls-key key.pem --max-connections 2000"
+    )]
     Serve(Serve),
 }
 
@@ -292,8 +295,35 @@ pub(crate) struct Serve {
     /// Folder of the stream.
     pub(crate) stream: PathBuf,
     /// Address and port.
-    #[arg(long, value_name = "ADDR", default_value = reconstructor::serve::DEFAULT_ADDRESS)]
+    #[arg(long, value_name = "ADDR", default_value = server::DEFAULT_ADDRESS)]
     pub(crate) listen: SocketAddr,
+    /// Certificate chain for HTTPS, the server's own certificate first.
+    #[arg(long, value_name = "FILE.pem", requires = "tls_key")]
+    pub(crate) tls_cert: Option<PathBuf>,
+    /// Private key of that certificate.
+    #[arg(long, value_name = "FILE.pem", requires = "tls_cert")]
+    pub(crate) tls_key: Option<PathBuf>,
+    /// HTTPS with a certificate made for this run; its fingerprint is printed.
+    #[arg(long, conflicts_with = "tls_cert")]
+    pub(crate) tls_self_made: bool,
+    /// Connections open at a time; further ones are closed at once. More than 400 may need a higher `ulimit -n`.
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) max_connections: u32,
+}
+
+impl Serve {
+    /// The server's options.
+    pub(crate) fn options(&self) -> ServeOptions {
+        let tls = match (&self.tls_cert, &self.tls_key) {
+            (Some(certificate), Some(key)) => {
+                Tls::Files { certificate: certificate.clone(), key: key.clone() }
+            }
+            _ if self.tls_self_made => Tls::SelfMade,
+            _ => Tls::Off,
+        };
+        let max_connections = usize::try_from(self.max_connections).unwrap_or(usize::MAX);
+        ServeOptions { address: self.listen, tls, max_connections, ..ServeOptions::default() }
+    }
 }
 
 /// `X,Y,Z` in metres.
@@ -355,6 +385,30 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_certificate_goes_with_its_key() {
+        let options = |words: &[&str]| {
+            let words = ["reconstructor", "serve", "stream"].iter().chain(words);
+            match Cli::try_parse_from(words).map(|cli| cli.command) {
+                Ok(Command::Serve(serve)) => Some(serve.options()),
+                _ => None,
+            }
+        };
+        assert_eq!(options(&[]), Some(ServeOptions::default()));
+        let files = Tls::Files { certificate: "a".into(), key: "b".into() };
+        assert_eq!(options(&["--tls-cert", "a", "--tls-key", "b"]).map(|options| options.tls), Some(files));
+        assert_eq!(options(&["--tls-self-made"]).map(|options| options.tls), Some(Tls::SelfMade));
+        assert_eq!(options(&["--max-connections", "9"]).map(|options| options.max_connections), Some(9));
+        for wrong in [
+            &["--tls-cert", "a"] as &[_],
+            &["--tls-key", "b"],
+            &["--tls-self-made", "--tls-cert", "a", "--tls-key", "b"],
+            &["--max-connections", "0"],
+        ] {
+            assert_eq!(options(wrong), None, "{wrong:?}");
+        }
     }
 
     #[test]

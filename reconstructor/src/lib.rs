@@ -24,7 +24,6 @@ pub mod pipeline;
 pub mod pose;
 pub mod report;
 pub mod segmentation;
-pub mod serve;
 pub mod shots;
 pub mod teams;
 pub mod tracking;

@@ -24,7 +24,6 @@ use reconstructor::{
     pipeline::{ObserveOptions, ReconstructOptions, reconstruct},
     report::{Progress, Reporter},
     segmentation::Method,
-    serve::serve,
     tracking::TrackingLimits,
     trajectory::Smoothing,
 };
@@ -103,7 +102,7 @@ fn run(command: Command) -> Result<()> {
             write_figures(&arguments.json, &evaluate::segmentation::evaluate(&options)?)
         }
         Command::Evaluate(Evaluate::Realism(arguments)) => run_evaluate_realism(&arguments),
-        Command::Serve(arguments) => Ok(serve(&arguments.stream, arguments.listen)?),
+        Command::Serve(arguments) => Ok(serving::server::serve(&arguments.stream, arguments.options())?),
     }
 }
 

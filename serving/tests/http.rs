@@ -7,6 +7,9 @@ mod support;
 use reqwest::{Client, Method, Response, StatusCode, header};
 use support::{BIG, CHUNK, WAYS, client, manifest, options, replace, start, stream};
 
+/// Names and values.
+type Headers<'a> = &'a [(&'a str, &'a str)];
+
 async fn get(client: &Client, url: String, headers: &[(&str, &str)]) -> Response {
     headers
         .iter()
@@ -46,7 +49,7 @@ async fn files_ranges_conditions_types_and_origins() {
         let older = "Mon, 01 Jan 2001 00:00:00 GMT";
         let (all, part, none) = (StatusCode::OK, StatusCode::PARTIAL_CONTENT, StatusCode::NOT_MODIFIED);
         let failed = StatusCode::PRECONDITION_FAILED;
-        let cases: [(&[(&str, &str)], StatusCode, &str); 17] = [
+        let cases: [(Headers<'_>, StatusCode, &str); 17] = [
             (&[("range", "bytes=3-5")], part, "345"),
             (&[("range", "bytes=-2")], part, "89"),
             (&[("range", "bytes=8-")], part, "89"),
