@@ -51,7 +51,7 @@ fn a_stream_that_is_not_there_is_one_line_and_exit_code_1() {
     for arguments in [
         &["no-such-stream"][..],
         &["inspect", "no-such-stream"],
-        &["inspect", "https://example.org/stream"],
+        &["inspect", "https://127.0.0.1:9/"],
         &["inspect", "http://127.0.0.1:9/"],
     ] {
         let output = player(arguments);
@@ -60,6 +60,32 @@ fn a_stream_that_is_not_there_is_one_line_and_exit_code_1() {
         let address = arguments.last().unwrap();
         assert!(line.contains(address), "{line}");
     }
+}
+
+#[test]
+fn a_stream_is_read_over_https_from_those_who_are_trusted() {
+    use serving::server::{ServeOptions, Server, Tls};
+    let folder = tempfile::tempdir().unwrap();
+    support::write_match(folder.path(), 40);
+    let address = "127.0.0.1:0".parse().unwrap();
+    let server =
+        Server::start(folder.path(), ServeOptions { address, tls: Tls::SelfMade, ..Default::default() })
+            .unwrap();
+    let certificate = folder.path().join("certificate.pem");
+    std::fs::write(&certificate, server.self_made_certificate().unwrap()).unwrap();
+    let inspect = |trusted: Option<&std::path::Path>| {
+        Command::new(env!("CARGO_BIN_EXE_player"))
+            .args(["inspect", &server.url()])
+            .envs(trusted.map(|file| ("SSL_CERT_FILE", file)))
+            .output()
+            .unwrap()
+    };
+    let friend = inspect(Some(&certificate));
+    assert!(friend.status.success(), "{}", String::from_utf8_lossy(&friend.stderr));
+    let stranger = inspect(None);
+    assert_eq!(stranger.status.code(), Some(1));
+    let line = error_line(&stranger);
+    assert!(line.contains(&server.url()), "{line}");
 }
 
 #[test]

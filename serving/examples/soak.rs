@@ -240,6 +240,9 @@ async fn soak(arguments: &Arguments, stream: &Path) -> ExitCode {
 
 fn client(http2: bool, tls: Option<&Path>) -> reqwest::Client {
     let mut builder = reqwest::Client::builder().no_proxy().timeout(Duration::from_secs(10));
+    if tls.is_none() {
+        builder = builder.tls_certs_only([]);
+    }
     if let Some(stream) = tls {
         let pem = fs::read(stream.with_extension("cert.pem")).unwrap();
         builder = builder.tls_certs_only([reqwest::Certificate::from_pem(&pem).unwrap()]);

@@ -8,12 +8,6 @@ use crate::scene::AtlasError;
 /// Why a stream, or a part of it, cannot be shown.
 #[derive(Debug, Error)]
 pub enum SourceError {
-    /// `https://` was asked for.
-    #[error("{url}: https is not supported yet: use http:// or a folder")]
-    Https {
-        /// The address.
-        url: String,
-    },
     /// Not an address.
     #[error("{url}: not a valid address ({reason}): give a folder or http://host/path/")]
     Address {

@@ -105,7 +105,7 @@ fn object_advice(error: &object_store::Error) -> &'static str {
 }
 
 /// The innermost reasons in one bounded line: storage answers with pages of XML, which come from outside.
-fn summary(error: &object_store::Error) -> String {
+pub(super) fn summary(error: &object_store::Error) -> String {
     const LONGEST: usize = 400;
     let mut text = error.to_string();
     let mut cause = error.source();

@@ -14,7 +14,7 @@ use object_store::{
 use tokio::runtime::Runtime;
 use tokio_rustls::rustls::crypto::ring;
 
-use super::{DestinationError, FileKind};
+use super::{DestinationError, FileKind, error::summary};
 
 /// A chunk of several megabytes over a slow line takes longer than the 30 s that are usual.
 const REQUEST_TIMEOUT: &str = "2 minutes";
@@ -72,7 +72,7 @@ impl Objects {
         let _ = ring::default_provider().install_default();
         let store = store(scheme, bucket, settings)
             .ok_or_else(|| wrong(format!("`{scheme}://` is not known")))?
-            .map_err(|error| wrong(error.to_string()))?;
+            .map_err(|error| wrong(summary(&error)))?;
         let prefix = Path::parse(prefix).map_err(|error| wrong(error.to_string()))?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
