@@ -22,7 +22,7 @@ const FOLDER: &str = "HOLOPITCH_TEST_SERVE";
 #[test]
 fn a_stop_lets_requests_under_way_finish() {
     let folder = stream();
-    let server = start(folder.path(), false, options());
+    let server = start(folder.path(), false, ServeOptions { stop_deadline: LONG, ..options() });
     let address = server.address();
     let mut idle = connect(address);
     ask(&mut idle, "/high/00000.glb");
@@ -43,7 +43,7 @@ fn a_stop_lets_requests_under_way_finish() {
 async fn a_stop_lets_http2_answers_finish() {
     let folder = stream();
     for tls in [false, true] {
-        let server = start(folder.path(), tls, options());
+        let server = start(folder.path(), tls, ServeOptions { stop_deadline: LONG, ..options() });
         let client = client(&server, reqwest::Version::HTTP_2);
         let mut response = client.get(format!("{}high/big.glb", server.url())).send().await.unwrap();
         let address = server.address();

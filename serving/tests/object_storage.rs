@@ -8,7 +8,10 @@ use std::{
     io::{BufRead, BufReader},
     path::Path,
     process::{Child, Command, Stdio},
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        atomic::{AtomicBool, AtomicU32, Ordering},
+        mpsc,
+    },
     time::Duration,
 };
 
@@ -130,8 +133,12 @@ fn name(index: usize) -> String {
     format!("high/{index:05}.glb")
 }
 
-fn upload(place: &Destination) -> Result<(), DestinationError> {
+/// Uploads the stream; waits in the middle until told to go on.
+fn upload(place: &Destination, go_on: &mpsc::Receiver<()>) -> Result<(), DestinationError> {
     for index in 0..CHUNKS {
+        if index == CHUNKS / 2 {
+            go_on.recv().unwrap();
+        }
         place.put(&name(index), &chunk(index), FileKind::Geometry)?;
     }
     place.put("match.json", manifest(1).as_bytes(), FileKind::Manifest)
@@ -145,45 +152,41 @@ fn a_stream_is_uploaded_over_a_restart_with_its_manifest_last() {
     let place = storage.destination("s3://streams/matches/7/", SECRET);
     let reader = storage.reader();
     let prefix = object_store::path::Path::from("matches/7");
-    let done = AtomicBool::new(false);
+    let (done, looks) = (AtomicBool::new(false), AtomicU32::new(0));
+    let (go_on, told) = mpsc::channel();
     std::thread::scope(|scope| {
         let uploading = scope.spawn(|| {
-            let result = upload(&place);
+            let told = told;
+            let result = upload(&place, &told);
             done.store(true, Ordering::Relaxed);
             result
         });
         let looking = scope.spawn(|| {
             // Whoever finds the manifest finds everything.
-            let mut looks = 0;
             runtime().block_on(async {
+                let (manifest, high) = (prefix.clone().join("match.json"), prefix.clone().join("high"));
                 while !done.load(Ordering::Relaxed) {
-                    let found = reader.head(&prefix.clone().join("match.json")).await.is_ok();
-                    let Ok(chunks) = reader.list_with_delimiter(Some(&prefix.clone().join("high"))).await
-                    else {
-                        continue;
-                    };
-                    assert!(
-                        !found || chunks.objects.len() == CHUNKS,
-                        "a manifest with {} chunks",
-                        chunks.objects.len()
-                    );
-                    looks += u32::from(!found && !chunks.objects.is_empty());
+                    let found = reader.head(&manifest).await.is_ok();
+                    let Ok(chunks) = reader.list_with_delimiter(Some(&high)).await else { continue };
+                    let count = chunks.objects.len();
+                    assert!(!found || count == CHUNKS, "a manifest with {count} chunks");
+                    if !found && count == CHUNKS / 2 {
+                        looks.fetch_add(1, Ordering::Relaxed);
+                    }
                 }
             });
-            looks
         });
-        let written = folder.path().join(BUCKET).join("matches/7/high");
-        wait_for("some chunks to be there", || {
-            std::fs::read_dir(&written).is_ok_and(|files| files.count() > CHUNKS / 4)
+        wait_for("half of the stream to be seen", || {
+            looks.load(Ordering::Relaxed) > 0 || uploading.is_finished()
         });
-        // Killed, not stopped: whatever was under way is lost. The uploader finds nobody for a while.
+        // Killed, not stopped, and the upload goes on with nobody there.
         drop(storage);
-        assert!(!uploading.is_finished(), "the upload was over before the storage went away");
+        go_on.send(()).unwrap();
         std::thread::sleep(Duration::from_millis(500));
         assert!(!uploading.is_finished(), "the upload gave up: {:?}", uploading.join());
         let _storage = Storage::start(folder.path(), port);
         uploading.join().unwrap().unwrap();
-        assert!(looking.join().unwrap() > 0, "nobody looked while chunks were written");
+        looking.join().unwrap();
         read_back(&place, &reader, &prefix);
     });
 }

@@ -203,6 +203,10 @@ mod tests {
             ("AWS_ACCESS_KEY_ID", "a"),
             ("AWS_SECRET_ACCESS_KEY", "b"),
             ("AWS_NONSENSE", "c"),
+            // A machine without any certificates will do.
+            ("AWS_DISABLE_SYSTEM_CERTIFICATES", "true"),
+            ("AZURE_DISABLE_SYSTEM_CERTIFICATES", "true"),
+            ("GOOGLE_DISABLE_SYSTEM_CERTIFICATES", "true"),
             ("AZURE_STORAGE_ACCOUNT_NAME", "account"),
             ("AZURE_STORAGE_ACCOUNT_KEY", "c2VjcmV0"),
             ("GOOGLE_SKIP_SIGNATURE", "true"),

@@ -154,6 +154,11 @@ pub fn serve(folder: &Path, options: ServeOptions) -> Result<(), ServeError> {
     let runtime = runtime()?;
     let deadline_s = options.stop_deadline.as_secs_f32();
     let (door, bound) = open(&runtime, folder, options)?;
+    // Before anything is said: whoever reads it may want to stop at once.
+    let interrupted = {
+        let _context = runtime.enter();
+        interrupted()
+    };
     let url = bound.url();
     println!("serving {} at {url}", folder.display());
     if let Some(identity) = &bound.identity {
@@ -161,7 +166,7 @@ pub fn serve(folder: &Path, options: ServeOptions) -> Result<(), ServeError> {
     }
     println!("watch it with `player {url}`; figures at {url}metrics; stop with Ctrl-C");
     run(&runtime, door, async move {
-        interrupted().await;
+        interrupted.await;
         println!("stopping: requests under way have {deadline_s} s");
     });
     wind_down(runtime);
@@ -169,31 +174,39 @@ pub fn serve(folder: &Path, options: ServeOptions) -> Result<(), ServeError> {
     Ok(())
 }
 
-/// Waits for Ctrl-C or, where there is one, SIGTERM.
+/// Listens for Ctrl-C and, where there is one, SIGTERM; the future waits for either.
+#[cfg(unix)]
+fn interrupted() -> impl Future<Output = ()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let listen = |kind, name: &str| {
+        signal(kind)
+            .inspect_err(|error| {
+                tracing::warn!("cannot listen for {name} ({error}): it ends the server at once")
+            })
+            .ok()
+    };
+    let (interrupt, terminate) =
+        (listen(SignalKind::interrupt(), "Ctrl-C"), listen(SignalKind::terminate(), "SIGTERM"));
+    let wait = |signal: Option<tokio::signal::unix::Signal>| async {
+        match signal {
+            Some(mut signal) => drop(signal.recv().await),
+            None => std::future::pending().await,
+        }
+    };
+    async move {
+        tokio::select! {
+            () = wait(interrupt) => {}
+            () = wait(terminate) => {}
+        }
+    }
+}
+
+/// Waits for Ctrl-C.
+#[cfg(not(unix))]
 async fn interrupted() {
-    let interrupt = async {
-        if let Err(error) = tokio::signal::ctrl_c().await {
-            tracing::warn!("cannot listen for Ctrl-C ({error}): stop the process to end the server");
-            std::future::pending::<()>().await;
-        }
-    };
-    #[cfg(unix)]
-    let terminate = async {
-        match tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
-            Ok(mut signal) => {
-                signal.recv().await;
-            }
-            Err(error) => {
-                tracing::warn!("cannot listen for SIGTERM ({error}): it ends the server at once");
-                std::future::pending::<()>().await;
-            }
-        }
-    };
-    #[cfg(not(unix))]
-    let terminate = std::future::pending::<()>();
-    tokio::select! {
-        () = interrupt => {}
-        () = terminate => {}
+    if let Err(error) = tokio::signal::ctrl_c().await {
+        tracing::warn!("cannot listen for Ctrl-C ({error}): stop the process to end the server");
+        std::future::pending::<()>().await;
     }
 }
 
