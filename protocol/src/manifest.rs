@@ -100,7 +100,11 @@ pub struct Manifest {
     /// The shots of the broadcast and the gaps between them, in order of time; empty when nothing is known of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub segments: Vec<Segment>,
-    /// The quality ladder, best last.
+    /// Present while the stream is still being written: this file will be replaced by one with more chunks. Absent in a
+    /// stream that is complete.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub live: Option<Live>,
+    /// The quality ladder, best last. All have chunks at the same times; while the stream is live some may have fewer.
     pub representations: Vec<Representation>,
 }
 
@@ -236,6 +240,13 @@ pub enum SegmentKind {
     /// Of a kind that this reader does not know.
     #[serde(other)]
     Other,
+}
+
+/// What a reader needs to follow a stream that is still being written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Live {
+    /// How long to wait before the manifest is read again; about the length of a chunk.
+    pub update_after: Ticks,
 }
 
 /// One quality of the whole match.

@@ -64,6 +64,7 @@ pub fn match_of(frames: u32, people: u32) -> Result<SampleMatch, ChunkError> {
         static_scene: None,
         people: (0..people).map(person).collect(),
         segments: Vec::new(),
+        live: None,
         representations: vec![Representation { id: "high".to_owned(), triangles_per_body: 72, chunks }],
     };
     Ok(SampleMatch { manifest, files })
