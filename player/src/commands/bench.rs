@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
     let mut first_frame = None;
     let mut keys = Vec::new();
     for index in 0..stream.chunks().len() {
-        let loaded = runtime.block_on(stream.chunk(index))?;
+        let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
         fetch.push(loaded.fetch);
         verify.push(loaded.verify);
         decode.push(loaded.decode);
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
         for (place, frame) in loaded.chunk.frames.iter().enumerate() {
             keys.push((index, place));
             let scene = build.time(|| FrameScene::new(frame, &people, &limits));
-            let scene = scene.with_context(|| stream.chunk_name(index))?;
+            let scene = scene.with_context(|| stream.chunk_name(stream.best(), index))?;
             upload.time(|| {
                 renderer.upload(&gpu.device, &gpu.queue, &scene);
                 gpu.queue.submit([]);
@@ -104,7 +104,7 @@ pub(super) fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
         // A stride near the golden ratio visits the whole stream without pattern.
         let Some(&(index, place)) = keys.get((step * 618 + 309) % 1000 * keys.len() / 1000) else { break };
         seek.time(|| -> anyhow::Result<()> {
-            let loaded = runtime.block_on(stream.chunk(index))?;
+            let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
             let frame = loaded.chunk.frames.get(place).context("the stream changed while it was measured")?;
             let scene = FrameScene::new(frame, &people, &limits)?;
             renderer.upload(&gpu.device, &gpu.queue, &scene);

@@ -80,10 +80,10 @@ pub(super) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
         hashes_verified: 0,
     };
     for index in 0..stream.chunks().len() {
-        let loaded = runtime.block_on(stream.chunk(index))?;
+        let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
         figures.hashes_verified += 1;
-        let split =
-            chunk::byte_split(&loaded.file, stream.limits()).with_context(|| stream.chunk_name(index))?;
+        let split = chunk::byte_split(&loaded.file, stream.limits())
+            .with_context(|| stream.chunk_name(stream.best(), index))?;
         figures.chunk_bytes += loaded.file.len();
         figures.geometry_bytes += split.geometry;
         figures.texture_bytes += split.texture;

@@ -16,7 +16,7 @@ use protocol::{
     chunk::{self, Chunk},
     hash,
     limits::Limits,
-    manifest::{ChunkEntry, FILE_NAME, Manifest, Representation},
+    manifest::{ChunkEntry, FILE_NAME, Manifest},
 };
 
 /// A stream that was opened: its manifest was read and makes sense.
@@ -25,8 +25,6 @@ pub struct Stream {
     limits: Limits,
     /// What the stream holds.
     pub manifest: Manifest,
-    /// The representation that is played: the best.
-    representation: Representation,
     /// Bytes of the manifest.
     pub manifest_bytes: usize,
 }
@@ -38,6 +36,8 @@ pub struct LoadedChunk {
     pub chunk: Chunk,
     /// The file as it came.
     pub file: Vec<u8>,
+    /// When it was asked for.
+    pub started: Instant,
     /// Reading or downloading it.
     pub fetch: Duration,
     /// Comparing its hash.
@@ -52,25 +52,37 @@ impl Stream {
         let bytes = location.fetch(FILE_NAME, limits.manifest_bytes).await?;
         let broken = |problem| SourceError::Manifest { file: location.name_of(FILE_NAME), problem };
         let manifest = Manifest::from_json(&bytes, &limits).map_err(broken)?;
-        let Some(representation) = manifest.representations.last().cloned() else {
-            return Err(SourceError::Empty { file: location.name_of(FILE_NAME) });
-        };
-        if representation.chunks.is_empty() {
+        if manifest.representations.iter().all(|item| item.chunks.is_empty()) {
             return Err(SourceError::Empty { file: location.name_of(FILE_NAME) });
         }
-        Ok(Self { location, limits, manifest, representation, manifest_bytes: bytes.len() })
+        Ok(Self { location, limits, manifest, manifest_bytes: bytes.len() })
     }
 
-    /// The chunks of the representation that is played, in order of time.
+    /// Reads the manifest again, for a stream that grows.
+    pub async fn read_again(&self) -> Result<Self, SourceError> {
+        Self::open(self.location.clone(), self.limits).await
+    }
+
+    /// Index of the best representation.
+    #[must_use]
+    pub fn best(&self) -> usize {
+        self.manifest.representations.len().saturating_sub(1)
+    }
+
+    /// The chunks of the best representation, in order of time.
     #[must_use]
     pub fn chunks(&self) -> &[ChunkEntry] {
-        &self.representation.chunks
+        self.chunks_of(self.best())
     }
 
-    /// The name of the representation that is played.
+    /// The name of the best representation.
     #[must_use]
     pub fn representation(&self) -> &str {
-        &self.representation.id
+        self.manifest.best().map_or("", |best| best.id.as_str())
+    }
+
+    fn chunks_of(&self, representation: usize) -> &[ChunkEntry] {
+        self.manifest.representations.get(representation).map_or(&[], |item| item.chunks.as_slice())
     }
 
     /// Where the stream is.
@@ -87,15 +99,16 @@ impl Stream {
 
     /// The full name of a chunk's file, for messages.
     #[must_use]
-    pub fn chunk_name(&self, index: usize) -> String {
-        let path = self.chunks().get(index).map_or("?", |entry| entry.file.path.as_str());
-        self.location.name_of(path)
+    pub fn chunk_name(&self, representation: usize, index: usize) -> String {
+        let entry = self.chunks_of(representation).get(index);
+        self.location.name_of(entry.map_or("?", |entry| entry.file.path.as_str()))
     }
 
-    /// Fetches, verifies and decodes a chunk.
-    pub async fn chunk(&self, index: usize) -> Result<LoadedChunk, SourceError> {
-        let Some(entry) = self.chunks().get(index) else {
-            return Err(SourceError::NoSuchChunk { index, count: self.chunks().len() });
+    /// Fetches, verifies and decodes a chunk of a representation.
+    pub async fn chunk(&self, representation: usize, index: usize) -> Result<LoadedChunk, SourceError> {
+        let chunks = self.chunks_of(representation);
+        let Some(entry) = chunks.get(index) else {
+            return Err(SourceError::NoSuchChunk { index, count: chunks.len() });
         };
         let limit = self.limits.chunk_bytes;
         let asked = Instant::now();
@@ -113,6 +126,7 @@ impl Stream {
         Ok(LoadedChunk {
             chunk,
             file,
+            started: asked,
             fetch: fetched - asked,
             verify: verified - fetched,
             decode: verified.elapsed(),

@@ -9,6 +9,9 @@ use super::{
 };
 use crate::time::Ticks;
 
+/// Chunks looked at ahead of the play head, however short a hostile manifest makes them.
+const MOST_CHUNKS: usize = 100;
+
 /// Chunks worth keeping.
 #[derive(Debug)]
 pub(super) struct Window {
@@ -79,8 +82,10 @@ impl<C: Content> Playback<C> {
         let (first, _) = self.ladder.at(position);
         let to_end = self.ladder.between(position, self.end());
         let around = self.config.at_end == AtEnd::Loop && !self.is_live();
-        let straight = (first..self.ladder.chunks()).map(move |chunk| (chunk, Duration::ZERO, position));
-        let again = if around { 0..first } else { 0..0 };
+        let straight = (first..self.ladder.chunks())
+            .take(MOST_CHUNKS)
+            .map(move |chunk| (chunk, Duration::ZERO, position));
+        let again = if around { 0..first.min(MOST_CHUNKS) } else { 0..0 };
         let again = again.map(move |chunk| (chunk, to_end, self.start()));
         let steps = straight.chain(again).filter_map(move |(chunk, before, position)| {
             let span = self.ladder.span(chunk)?;
