@@ -178,3 +178,42 @@ fn what_appears_behind_a_gap_at_the_edge_is_jumped_to() {
     playback.update(s(2), &world.manifest_of(11, live)).unwrap();
     assert_eq!(playback.position(s(2)), Ticks(70_000));
 }
+
+#[test]
+fn after_waiting_at_the_edge_it_goes_on_with_its_distance_restored() {
+    let world = MadeUpMatch::default();
+    let live = Some(Live { update_after: Ticks(1_000) });
+    let mut playback = Playback::new(&world.manifest_of(10, live), PlaybackConfig::default()).unwrap();
+    let fetch = |playback: &mut Playback<FakeContent>, now: Duration| {
+        while let Some(request) = playback.poll_request(now) {
+            let transfer = Transfer { bytes: 250_000, started: now - ms(100), finished: now };
+            playback.on_chunk(now, request, std::sync::Arc::new(world.content(request.chunk)), transfer);
+        }
+        playback.frame(now).state
+    };
+    playback.play(s(1));
+    assert_eq!(fetch(&mut playback, s(1)), PlaybackState::Playing);
+    assert_eq!(fetch(&mut playback, s(4)), PlaybackState::Buffering, "at the edge");
+    playback.update(s(5), &world.manifest_of(11, live)).unwrap();
+    assert_eq!(fetch(&mut playback, s(5)), PlaybackState::Buffering, "one chunk would be over in a second");
+    playback.update(s(6), &world.manifest_of(12, live)).unwrap();
+    assert_eq!(fetch(&mut playback, s(6)), PlaybackState::Playing);
+    let stats = playback.stats(s(6));
+    assert_eq!((stats.stalls, stats.latency), (1, Some(s(2))));
+}
+
+#[test]
+fn paused_at_the_edge_is_not_the_end_and_play_does_not_go_back() {
+    let world = MadeUpMatch::default();
+    let live = Some(Live { update_after: Ticks(1_000) });
+    let mut playback: Playback<FakeContent> =
+        Playback::new(&world.manifest_of(10, live), PlaybackConfig::default()).unwrap();
+    playback.seek(s(1), Ticks(10_000));
+    assert_eq!(playback.frame(s(1)).state, PlaybackState::Paused);
+    playback.play(s(1));
+    assert_eq!(playback.frame(s(2)).state, PlaybackState::Buffering);
+    assert_eq!(playback.position(s(2)), Ticks(10_000));
+    // The last manifest says that this was all.
+    playback.update(s(3), &world.manifest_of(10, None)).unwrap();
+    assert_eq!(playback.frame(s(3)).state, PlaybackState::Ended);
+}
