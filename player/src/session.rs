@@ -3,12 +3,21 @@
 //! Owns no clock: the caller says what time it is. While a due frame is still being built the match's clock stands, so
 //! that a machine too slow for every frame shows fewer of them, and not none.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    hash::{BuildHasher, Hasher, RandomState},
+    sync::Arc,
+    time::Duration,
+};
 
 use protocol::{
-    chunk::{Chunk, FrameQuality},
+    chunk::FrameQuality,
+    content::AnyChunk,
     manifest::{Manifest, Segment},
-    playback::{FailureKind, Playback, PlaybackConfig, PlaybackState, Request, ShownFrame, Speed},
+    playback::{
+        FailureKind, Playback, PlaybackConfig, PlaybackState, Request, RetryConfig, ShownFrame, Speed,
+        Transfer,
+    },
     time::Ticks,
 };
 
@@ -16,7 +25,7 @@ use crate::{
     scene::FrameScene,
     source::{
         SourceError,
-        loader::{Event, FrameKey, Loader},
+        loader::{Event, Fetched, FrameKey, FrameSource, Loader},
     },
     timeline::Timeline,
 };
@@ -46,7 +55,7 @@ pub struct Session {
     loader: Loader,
     manifest: Option<Manifest>,
     timeline: Option<Timeline>,
-    playback: Option<Playback>,
+    playback: Option<Playback<AnyChunk>>,
     /// Where the caller's clock stood at the last update, and how far the match's clock is behind it.
     updated_at: Duration,
     lag: Duration,
@@ -55,8 +64,8 @@ pub struct Session {
     position: Ticks,
     /// What the playback asked for and has not got.
     requests: Vec<Request>,
-    /// Decoded chunks near the one on show.
-    chunks: BTreeMap<usize, Arc<Chunk>>,
+    /// Whether the manifest of a live stream is being read again.
+    reading_manifest: bool,
     frames: BTreeMap<FrameKey, Arc<FrameScene>>,
     broken_frames: BTreeMap<FrameKey, String>,
     wanted_frames: Vec<FrameKey>,
@@ -82,7 +91,7 @@ impl Session {
             state: PlaybackState::Paused,
             position: Ticks(0),
             requests: Vec::new(),
-            chunks: BTreeMap::new(),
+            reading_manifest: false,
             frames: BTreeMap::new(),
             broken_frames: BTreeMap::new(),
             wanted_frames: Vec::new(),
@@ -127,7 +136,7 @@ impl Session {
     /// How fast it runs.
     #[must_use]
     pub fn speed(&self) -> Speed {
-        self.playback.as_ref().map_or(Speed::NORMAL, Playback::speed)
+        self.playback.as_ref().map_or(Speed::NORMAL, |playback| playback.speed())
     }
 
     /// The frame on show; the last good one while another is loading or missing.
@@ -225,8 +234,11 @@ impl Session {
     fn take(&mut self, event: Event, now: Duration) {
         match event {
             Event::Opened(manifest) => {
-                let best = manifest.representations.len().saturating_sub(1);
-                match Playback::new(&manifest, best, PlaybackConfig::default()) {
+                // Every viewer waits a little differently before asking a server again that was away.
+                let seed = RandomState::new().build_hasher().finish();
+                let retry = RetryConfig { seed, ..RetryConfig::default() };
+                let config = PlaybackConfig { retry, ..PlaybackConfig::default() };
+                match Playback::new(&manifest, config) {
                     Ok(playback) => {
                         self.playback = Some(playback);
                         self.problem = None;
@@ -240,6 +252,7 @@ impl Session {
                 self.retry_at = error.is_temporary().then(|| now + RETRY_AFTER);
             }
             Event::Chunk { request, result } => self.take_chunk(request, result, now),
+            Event::Manifest(result) => self.take_manifest(result, now),
             Event::Frame { key, result: Ok(scene) } => {
                 self.frames.insert(key, scene);
             }
@@ -250,20 +263,48 @@ impl Session {
         }
     }
 
-    fn take_chunk(&mut self, request: Request, result: Result<Arc<Chunk>, SourceError>, now: Duration) {
+    /// Follows a stream that grows.
+    fn take_manifest(&mut self, result: Result<Box<Manifest>, SourceError>, now: Duration) {
+        self.reading_manifest = false;
+        let Some(playback) = &mut self.playback else { return };
+        let updated = match result {
+            Ok(manifest) => {
+                let updated = playback.update(now, &manifest).map_err(|error| error.to_string());
+                updated.map(|_| manifest)
+            }
+            Err(error) => {
+                playback.on_manifest_failure(now);
+                Err(error.to_string())
+            }
+        };
+        match updated {
+            Ok(manifest) => {
+                self.manifest = Some(*manifest);
+                if let Some(timeline) = &mut self.timeline {
+                    timeline.duration = playback.end() - playback.start();
+                }
+            }
+            // It is read again soon; what is there goes on meanwhile.
+            Err(problem) => tracing::warn!("{problem}"),
+        }
+    }
+
+    fn take_chunk(&mut self, request: Request, result: Result<Fetched, SourceError>, now: Duration) {
         self.requests.retain(|waiting| *waiting != request);
         let Some(playback) = &mut self.playback else { return };
         match result {
-            Ok(chunk) => {
+            Ok(Fetched { chunk, bytes, fetch, finished }) => {
                 if let (None, Some(manifest), Some(first)) =
-                    (&self.timeline, &self.manifest, chunk.frames.first())
+                    (&self.timeline, &self.manifest, chunk.frames().first())
                 {
                     let (start, end) = (playback.start(), playback.end());
                     let (timescale, frame) = (manifest.timescale, first.duration);
                     self.timeline = Some(Timeline { timescale, start, duration: end - start, frame });
                 }
-                self.chunks.insert(request.chunk, chunk.clone());
-                playback.on_chunk(now, request, chunk);
+                // The loader's clock told on the match's clock.
+                let finished = now.saturating_sub(finished.elapsed());
+                let transfer = Transfer { bytes, started: finished.saturating_sub(fetch), finished };
+                playback.on_chunk(now, request, chunk, transfer);
                 self.problem = None;
             }
             Err(error) => {
@@ -328,40 +369,40 @@ impl Session {
     /// Hands the playback's requests to the loader.
     fn request(&mut self, now: Duration) {
         let Some(playback) = &mut self.playback else { return };
-        let before = self.requests.len();
+        let before = (self.reading_manifest, self.requests.clone());
+        self.reading_manifest |= playback.poll_manifest(now);
         self.requests.extend(std::iter::from_fn(|| playback.poll_request(now)));
-        if self.requests.len() != before {
-            // Answers to requests from before a seek are ignored: they need not be loaded either.
-            let generation = playback.generation();
-            self.requests.retain(|request| request.generation == generation);
-            self.loader.want_chunks(&self.requests);
+        // What was given up, or asked for before a seek, need not be loaded any more.
+        self.requests.retain(|request| playback.awaits(*request));
+        if before != (self.reading_manifest, self.requests.clone()) {
+            self.loader.want(self.reading_manifest, &self.requests);
         }
     }
 
     /// Has the frames from `due` on built, and forgets what is far away.
-    fn want_frames(&mut self, due: &ShownFrame) {
+    fn want_frames(&mut self, due: &ShownFrame<AnyChunk>) {
+        let Some(playback) = &self.playback else { return };
         let (here, first) = (due.chunk_index, due.frame_index);
-        self.chunks.retain(|&chunk, _| chunk + 1 >= here && chunk <= here + 4);
-        let ahead: Vec<FrameKey> = self
-            .chunks
-            .range(here..=here + 1)
-            .flat_map(|(&chunk, content)| {
-                (0..content.frames.len()).map(move |frame| FrameKey { chunk, frame })
+        let ahead: Vec<(FrameKey, FrameSource)> = (here..=here + 1)
+            .filter_map(|chunk| Some((chunk, playback.content(chunk)?)))
+            .flat_map(|(chunk, (content, representation))| {
+                let source = FrameSource { chunk: content.clone(), representation };
+                (0..content.frames().len()).map(move |frame| (FrameKey { chunk, frame }, source.clone()))
             })
-            .skip_while(|key| (key.chunk, key.frame) < (here, first))
+            .skip_while(|(key, _)| (key.chunk, key.frame) < (here, first))
             .take(FRAMES_AHEAD)
             .collect();
         if self.frames.len() > FRAMES_KEPT {
-            self.frames.retain(|key, _| ahead.contains(key));
+            self.frames.retain(|key, _| ahead.iter().any(|(wanted, _)| wanted == key));
         }
-        let wanted: Vec<FrameKey> = ahead
+        let wanted: Vec<(FrameKey, FrameSource)> = ahead
             .into_iter()
-            .filter(|key| !self.frames.contains_key(key) && !self.broken_frames.contains_key(key))
+            .filter(|(key, _)| !self.frames.contains_key(key) && !self.broken_frames.contains_key(key))
             .collect();
-        if wanted != self.wanted_frames {
-            let items = wanted.iter().filter_map(|key| Some((*key, self.chunks.get(&key.chunk)?.clone())));
-            self.loader.want_frames(items.collect());
-            self.wanted_frames = wanted;
+        let keys: Vec<FrameKey> = wanted.iter().map(|(key, _)| *key).collect();
+        if keys != self.wanted_frames {
+            self.loader.want_frames(wanted);
+            self.wanted_frames = keys;
         }
     }
 }

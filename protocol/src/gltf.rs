@@ -20,6 +20,8 @@ pub struct Document {
     pub extensions_used: Vec<&'static str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub extensions_required: Vec<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub extensions: Option<serde_json::Value>,
     pub scene: usize,
     pub scenes: Vec<Scene>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -141,6 +143,7 @@ pub struct DracoExtension {
 #[serde(rename_all = "camelCase")]
 #[allow(missing_docs)]
 pub struct Material {
+    #[serde(skip_serializing_if = "String::is_empty")]
     pub name: String,
     pub pbr_metallic_roughness: Pbr,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -317,6 +320,15 @@ pub struct BufferView {
 #[allow(missing_docs)]
 pub struct Buffer {
     pub byte_length: usize,
+}
+
+impl BufferView {
+    /// Its bytes in the binary chunk `bin`; `None` when it leaves it.
+    #[must_use]
+    pub fn of<'a>(&self, bin: &'a [u8]) -> Option<&'a [u8]> {
+        let end = self.byte_offset.checked_add(self.byte_length)?;
+        bin.get(self.byte_offset..end).filter(|_| self.buffer == 0)
+    }
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature

@@ -5,8 +5,11 @@
 // Tests may panic: that is how they fail.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod atlas;
 pub mod camera;
 pub mod chunk;
+pub mod compact;
+pub mod content;
 pub mod glb;
 pub mod gltf;
 pub mod hash;

@@ -9,7 +9,7 @@ pub struct Limits {
     pub chunk_bytes: usize,
     /// Bytes of the JSON inside one chunk.
     pub chunk_json_bytes: usize,
-    /// Bytes that all meshes of one chunk take after decoding.
+    /// Bytes that everything in one chunk takes after decoding.
     pub decoded_bytes_per_chunk: usize,
     /// Chunks named by one manifest.
     pub chunks: usize,
@@ -33,7 +33,7 @@ impl Default for Limits {
             manifest_bytes: 8 << 20,
             chunk_bytes: 64 << 20,
             chunk_json_bytes: 16 << 20,
-            decoded_bytes_per_chunk: 512 << 20,
+            decoded_bytes_per_chunk: 128 << 20,
             chunks: 100_000,
             people: 1_000,
             frames_per_chunk: 300,

@@ -100,7 +100,11 @@ pub struct Manifest {
     /// The shots of the broadcast and the gaps between them, in order of time; empty when nothing is known of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub segments: Vec<Segment>,
-    /// The quality ladder, best last.
+    /// Present while the stream is still being written: this file will be replaced by one with more chunks. Absent in a
+    /// stream that is complete.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub live: Option<Live>,
+    /// The quality ladder, best last. All have chunks at the same times; while the stream is live some may have fewer.
     pub representations: Vec<Representation>,
 }
 
@@ -141,10 +145,10 @@ impl Manifest {
         check::manifest(self, limits)
     }
 
-    /// The best representation.
+    /// The best representation of a profile that this reader knows.
     #[must_use]
     pub fn best(&self) -> Option<&Representation> {
-        self.representations.last()
+        self.representations.iter().rfind(|representation| representation.profile != Profile::Other)
     }
 }
 
@@ -238,15 +242,39 @@ pub enum SegmentKind {
     Other,
 }
 
+/// What a reader needs to follow a stream that is still being written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Live {
+    /// How long to wait before the manifest is read again; about the length of a chunk.
+    pub update_after: Ticks,
+}
+
 /// One quality of the whole match.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Representation {
     /// Name, also the folder of its chunks.
     pub id: String,
+    /// How its chunks are made.
+    #[serde(default)]
+    pub profile: Profile,
     /// Triangles that a body has at most.
     pub triangles_per_body: u32,
     /// Chunks in order of time.
     pub chunks: Vec<ChunkEntry>,
+}
+
+/// How chunks are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Profile {
+    /// A mesh per person and frame, which every glTF viewer plays.
+    #[default]
+    Plain,
+    /// A mesh per person, and how it moves.
+    Compact,
+    /// Of a kind that this reader does not know.
+    #[serde(other)]
+    Other,
 }
 
 /// Where a chunk is.

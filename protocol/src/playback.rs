@@ -1,200 +1,133 @@
-//! The playback state machine: which chunk to fetch next, and which frame to show now.
+//! The playback state machine: which chunk to fetch next, in which quality, and which frame to show now.
 //!
 //! It owns no clock, no socket and no thread. The caller says what time it is (any [`Duration`] that only grows, for
 //! example since the program started), carries out [`Request`]s and hands decoded chunks back; the machine never blanks:
 //! while something is missing it holds the last good frame. Typical use, once per drawn picture:
 //!
 //! ```text
+//! if playback.poll_manifest(now) { start fetching the manifest }                       // live streams only
 //! while let Some(request) = playback.poll_request(now) { start fetching and decoding it }
-//! for each finished fetch { playback.on_chunk(request, chunk) or playback.on_failure(now, request, …) }
+//! stop every fetch that playback.awaits() no more
+//! for each finished fetch { playback.on_chunk(now, request, chunk, transfer) or playback.on_failure(now, request, …) }
+//! for a manifest that came { playback.update(now, &manifest) or playback.on_manifest_failure(now) }
 //! draw(playback.frame(now));
 //! sleep until playback.poll_timeout(now), or until a fetch finishes, or until the user does something
 //! ```
+//!
+//! One file per job: `ladder` (what the manifest says), `buffer` and `window` (what is at hand and what is wanted),
+//! `estimate` and `quality` (what the link carries and what to ask for), `backoff`, `clock`, `progress` (time passes),
+//! `live`, `stats`. `simulation` is a network for tests and benches.
 
+mod backoff;
 mod buffer;
 mod clock;
+mod config;
+mod content;
+mod error;
+mod estimate;
+mod ladder;
+mod live;
+mod progress;
+mod quality;
+#[cfg(any(test, feature = "sample"))]
+pub mod simulation;
+mod stats;
 #[cfg(test)]
 mod tests;
+mod view;
+mod window;
 
 use std::{sync::Arc, time::Duration};
 
 use self::{
     buffer::{Buffer, Slot},
     clock::Clock,
+    estimate::Estimate,
+    ladder::Ladder,
+    live::Follower,
+    quality::Chooser,
+    stats::Counters,
 };
 pub use self::{
     buffer::{Delivery, Failure, FailureKind, Request},
     clock::Speed,
+    config::{AtEnd, ChoiceConfig, Gaps, LiveConfig, PlaybackConfig, Quality, RetryConfig},
+    content::{Content, ShownFrame},
+    error::{PlaybackError, UpdateError},
+    estimate::Transfer,
+    stats::Stats,
+    view::{FrameView, PlaybackState},
 };
 use crate::{
-    chunk::{Chunk, ChunkFrame},
     manifest::Manifest,
     time::{Ticks, Timescale},
 };
 
-/// How much is fetched ahead, kept behind and tried again.
+/// What must be at hand before standing time runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PlaybackConfig {
-    /// Chunks fetched after the one being shown.
-    pub ahead: usize,
-    /// Chunks kept before the one being shown.
-    pub behind: usize,
-    /// Fetches under way at the same time.
-    pub in_flight: usize,
-    /// Times that a chunk is asked for before it counts as failed; at least 1.
-    pub attempts: u32,
-    /// Wait before the second attempt; doubles with every further one.
-    pub retry_after: Duration,
-    /// What happens after the last frame.
-    pub at_end: AtEnd,
+enum Wait {
+    /// After opening, a seek or a pause.
+    ToStart,
+    /// After a stall.
+    ToResume,
 }
 
-impl Default for PlaybackConfig {
-    fn default() -> Self {
-        Self {
-            ahead: 3,
-            behind: 1,
-            in_flight: 2,
-            attempts: 4,
-            retry_after: Duration::from_millis(250),
-            at_end: AtEnd::Hold,
-        }
-    }
-}
-
-/// What happens after the last frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AtEnd {
-    /// The last frame stays until the user does something.
-    Hold,
-    /// From the start again.
-    Loop,
-}
-
-/// What playback is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlaybackState {
-    /// Standing where the user left it.
-    Paused,
-    /// Time runs.
-    Playing,
-    /// Time would run, but the next frame has not arrived.
-    Buffering,
-    /// Standing on the last frame.
-    Ended,
-    /// Standing because a chunk could not be fetched; `play` or `seek` tries again.
-    Failed,
-}
-
-/// A frame inside a decoded chunk, cheap to keep.
-#[derive(Clone, Debug)]
-pub struct ShownFrame {
-    chunk: Arc<Chunk>,
-    /// Which chunk of the representation.
-    pub chunk_index: usize,
-    /// Which frame of that chunk.
-    pub frame_index: usize,
-}
-
-impl ShownFrame {
-    /// The frame.
-    #[must_use]
-    pub fn frame(&self) -> Option<&ChunkFrame> {
-        self.chunk.frames.get(self.frame_index)
-    }
-
-    /// The chunk that the frame belongs to.
-    #[must_use]
-    pub fn chunk(&self) -> &Arc<Chunk> {
-        &self.chunk
-    }
-}
-
-/// What to draw now.
-#[derive(Clone, Debug)]
-pub struct FrameView {
-    /// The frame to show; `None` only until the first chunk has arrived.
-    pub shown: Option<ShownFrame>,
-    /// Where the playhead stands. Differs from the time of `shown` while that is held.
-    pub position: Ticks,
-    /// What playback is doing.
-    pub state: PlaybackState,
-    /// Whether `shown` is held because the frame at `position` has not arrived or cannot be read.
-    pub held: bool,
-    /// Why the frame at `position` cannot be shown, once no further attempt is made.
-    pub failure: Option<Failure>,
-}
-
-/// Why playback cannot start.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlaybackError {
-    /// There is no such representation.
-    #[error("the stream has no representation {index}")]
-    NoRepresentation {
-        /// Asked for.
-        index: usize,
-    },
-    /// Nothing to show.
-    #[error("the stream has no chunks yet: nothing to play")]
-    Empty,
-}
-
-/// When a chunk is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Span {
-    start: Ticks,
-    end: Ticks,
-}
-
-/// Playback of one representation of one stream.
+/// Playback of one stream whose chunks are decoded to `C`.
 #[derive(Debug)]
-pub struct Playback {
+pub struct Playback<C> {
     timescale: Timescale,
-    spans: Vec<Span>,
+    ladder: Ladder,
     config: PlaybackConfig,
     clock: Clock,
+    /// As the user chose it; the clock may run a little faster to catch up.
+    speed: Speed,
     /// Whether the user wants time to run.
     playing: bool,
-    buffer: Buffer,
-    shown: Option<ShownFrame>,
+    wait: Wait,
+    buffer: Buffer<C>,
+    estimate: Estimate,
+    chooser: Chooser,
+    follower: Follower,
+    counters: Counters,
+    shown: Option<ShownFrame<C>>,
 }
 
-impl Playback {
-    /// Playback of representation `representation` of a manifest that has been validated, paused at the start.
+impl<C: Content> Playback<C> {
+    /// Playback of a manifest that has been validated, paused: at the start, or in a live stream as far behind its newest
+    /// chunk as the configuration says.
     ///
     /// # Errors
-    /// When there is nothing to play.
-    pub fn new(
-        manifest: &Manifest,
-        representation: usize,
-        config: PlaybackConfig,
-    ) -> Result<Self, PlaybackError> {
-        let chunks = &manifest
-            .representations
-            .get(representation)
-            .ok_or(PlaybackError::NoRepresentation { index: representation })?
-            .chunks;
-        let spans: Vec<Span> = chunks
-            .iter()
-            .map(|chunk| Span { start: chunk.start, end: chunk.start + chunk.duration })
-            .collect();
-        let start = spans.first().ok_or(PlaybackError::Empty)?.start;
-        Ok(Self {
+    /// When there is nothing to play, or no representation as the one that is asked for.
+    pub fn new(manifest: &Manifest, config: PlaybackConfig) -> Result<Self, PlaybackError> {
+        let ladder = Ladder::new(manifest, config.gaps)?;
+        let mut playback = Self {
             timescale: manifest.timescale,
-            clock: Clock::at(manifest.timescale.nanoseconds(start)),
-            spans,
-            config,
+            clock: Clock::at(manifest.timescale.nanoseconds(ladder.start())),
+            ladder,
+            speed: Speed::NORMAL,
             playing: false,
-            buffer: Buffer::default(),
+            wait: Wait::ToStart,
+            buffer: Buffer::new(config.retry),
+            estimate: Estimate::default(),
+            chooser: Chooser::new(Quality::Auto, config.choice),
+            follower: Follower::new(config.live, config.retry.seed),
+            counters: Counters::default(),
             shown: None,
-        })
+            config,
+        };
+        playback.set_quality(config.quality)?;
+        if playback.is_live() {
+            let position = playback.ladder.before_end(playback.target_latency());
+            playback.clock = Clock::at(playback.timescale.nanoseconds(position));
+        }
+        Ok(playback)
     }
 
     /// Lets time run; from the start when playback stands at the end. Asks again for what had failed.
     pub fn play(&mut self, now: Duration) {
         self.advance(now);
         self.buffer.forgive();
-        if self.position(now) >= self.end() {
+        if self.position(now) >= self.end() && !self.is_live() {
             self.go_to(now, self.start());
         }
         self.playing = true;
@@ -205,15 +138,23 @@ impl Playback {
     pub fn pause(&mut self, now: Duration) {
         self.advance(now);
         self.playing = false;
+        self.counters.stall_ends(now);
         self.clock.stop(now);
     }
 
-    /// Moves the playhead; playing or paused stays as it is.
+    /// Moves the play head; playing or paused stays as it is.
     pub fn seek(&mut self, now: Duration, target: Ticks) {
         self.advance(now);
         self.buffer.forgive();
         self.go_to(now, target);
         self.advance(now);
+    }
+
+    /// Moves the play head of a live stream to where it would join now. In other streams it does nothing.
+    pub fn go_live(&mut self, now: Duration) {
+        if self.is_live() {
+            self.seek(now, self.ladder.before_end(self.target_latency()));
+        }
     }
 
     /// Pauses and moves by whole frames, forwards or (negative) backwards.
@@ -232,31 +173,75 @@ impl Playback {
     /// Changes how fast time runs, from now on.
     pub fn set_speed(&mut self, now: Duration, speed: Speed) {
         self.advance(now);
+        self.speed = speed;
         self.clock.set_speed(now, speed);
+        self.advance(now);
     }
 
-    /// How fast time runs.
+    /// How fast time runs, as it was chosen.
     #[must_use]
     pub fn speed(&self) -> Speed {
+        self.speed
+    }
+
+    /// How fast time runs at the moment: in a live stream that is late, a little faster than was chosen.
+    #[must_use]
+    pub fn running_speed(&self) -> Speed {
         self.clock.speed()
+    }
+
+    /// Changes which representation is asked for, from the next request on. What is at hand stays.
+    ///
+    /// # Errors
+    /// When there is no such representation; then nothing changes.
+    pub fn set_quality(&mut self, quality: Quality) -> Result<(), PlaybackError> {
+        match quality {
+            Quality::Fixed(index) if index >= self.ladder.rungs() => {
+                Err(PlaybackError::NoRepresentation { index })
+            }
+            _ => {
+                self.chooser.quality = quality;
+                Ok(())
+            }
+        }
+    }
+
+    /// Which representation is asked for.
+    #[must_use]
+    pub fn quality(&self) -> Quality {
+        self.chooser.quality
     }
 
     /// The next chunk to fetch, if there is a reason to fetch one now. Call until `None`.
     pub fn poll_request(&mut self, now: Duration) -> Option<Request> {
-        self.advance(now);
-        let wanted = self.wanted(now);
-        self.buffer.next_request(now, &wanted, self.config.in_flight)
+        self.handle_timeout(now);
+        self.next_request(now)
     }
 
-    /// Takes a fetched and decoded chunk. Answers to requests from before a seek are ignored; a chunk with other times
-    /// than the manifest gave it counts as corrupt.
-    pub fn on_chunk(&mut self, now: Duration, request: Request, chunk: Arc<Chunk>) -> Delivery {
-        let span = self.spans.get(request.chunk);
-        if span.map(|span| (span.start, span.end)) != chunk.span() {
+    /// Whether the answer to a request is still waited for; if not, fetching it may be stopped.
+    #[must_use]
+    pub fn awaits(&self, request: Request) -> bool {
+        self.buffer.awaited(request).is_some()
+    }
+
+    /// Takes a fetched and decoded chunk and how it came. Answers to requests that are not waited for any more are
+    /// ignored; a chunk with other times than the manifest gave it counts as corrupt.
+    pub fn on_chunk(
+        &mut self,
+        now: Duration,
+        request: Request,
+        content: Arc<C>,
+        transfer: Transfer,
+    ) -> Delivery {
+        // It used the link, whether it is of use or not.
+        self.estimate.add(transfer);
+        self.counters.bytes = self.counters.bytes.saturating_add(transfer.bytes);
+        let span = self.ladder.span(request.chunk);
+        if span.map(|span| (span.start, span.end)) != content.span() {
             let message = "its frames do not fill the time that the manifest gives it".to_owned();
             return self.on_failure(now, request, FailureKind::Corrupt, message);
         }
-        let delivery = self.buffer.deliver(request, chunk);
+        let delivery = self.buffer.deliver(request, content);
         self.advance(now);
         delivery
     }
@@ -269,34 +254,68 @@ impl Playback {
         kind: FailureKind,
         message: String,
     ) -> Delivery {
-        let delivery = self.buffer.fail(now, request, kind, message, &self.config);
+        let delivery = self.buffer.fail(now, request, kind, message);
         self.advance(now);
         delivery
     }
 
-    /// When something changes by itself: the next frame is due, or a failed fetch is tried again.
-    #[must_use]
-    pub fn poll_timeout(&self, now: Duration) -> Option<Duration> {
-        let due = self.clock.is_running().then(|| {
-            let position = self.position(now);
-            let shown = self.at_hand(position);
-            let end = shown.as_ref().and_then(ShownFrame::frame).map(|frame| frame.start + frame.duration);
-            let next = end.filter(|end| *end > position).unwrap_or_else(|| self.span_at(position).1.end);
-            self.clock.reaches(now, self.timescale.nanoseconds(next))
-        });
-        self.buffer.next_retry().into_iter().chain(due).min()
+    /// Whether the manifest of a live stream is to be read again now. Says so once; answer with [`Playback::update`] or
+    /// [`Playback::on_manifest_failure`].
+    pub fn poll_manifest(&mut self, now: Duration) -> bool {
+        self.advance(now);
+        self.follower.poll(now)
     }
 
-    /// Lets the time since the last call pass. [`Playback::frame`] does it too.
+    /// Takes a newer manifest of the same stream, validated; whether it has more chunks. What is buffered stays.
+    ///
+    /// # Errors
+    /// When anything else differs than chunks at the end; then nothing changes, and the manifest is asked for again.
+    pub fn update(&mut self, now: Duration, manifest: &Manifest) -> Result<bool, UpdateError> {
+        self.advance(now);
+        let grown = match self.ladder.update(manifest) {
+            Ok(grown) => grown,
+            Err(error) => {
+                self.on_manifest_failure(now);
+                return Err(error);
+            }
+        };
+        self.follower.updated(now, self.update_after().unwrap_or_default(), grown);
+        let (position, inside) = (self.position(now), self.ladder.inside(self.position(now)));
+        // The play head waited at the edge, and what comes now starts after a gap.
+        if inside != position && !self.clock.is_running() {
+            self.clock.stand(self.timescale.nanoseconds(inside));
+        }
+        self.advance(now);
+        Ok(grown)
+    }
+
+    /// Takes the news that the manifest could not be read; it is asked for again.
+    pub fn on_manifest_failure(&mut self, now: Duration) {
+        self.follower.failed(now, &self.config.retry);
+        self.advance(now);
+    }
+
+    /// When something changes by itself: the next frame is due, a failed fetch is tried again, a slow one is given up, the
+    /// manifest is to be read. Never later than that, sometimes sooner. When it is not after `now`, then
+    /// [`Playback::poll_request`] and [`Playback::poll_manifest`] have something to do.
+    #[must_use]
+    pub fn poll_timeout(&self, now: Duration) -> Option<Duration> {
+        let fetches = self.buffer.next_event(self.may_ask(self.position(now)));
+        let manifest = self.follower.next_event();
+        self.next_frame_due(now).into_iter().chain(fetches).chain(manifest).min()
+    }
+
+    /// Lets the time since the last call pass. [`Playback::frame`] and [`Playback::poll_request`] do it too.
     pub fn handle_timeout(&mut self, now: Duration) {
+        self.give_up_late(now);
         self.advance(now);
     }
 
     /// What to draw now.
-    pub fn frame(&mut self, now: Duration) -> FrameView {
-        self.advance(now);
+    pub fn frame(&mut self, now: Duration) -> FrameView<C> {
+        self.handle_timeout(now);
         let position = self.position(now);
-        let (index, _) = self.span_at(position);
+        let (index, _) = self.ladder.at(position);
         let failure = match self.buffer.slot(index) {
             Some(Slot::Failed(failure)) => Some(failure.clone()),
             _ => None,
@@ -305,7 +324,7 @@ impl Playback {
             shown: self.shown.clone(),
             position,
             state: self.state(position, failure.as_ref()),
-            held: self.at_hand(position).is_none(),
+            held: self.frame_at(position).is_none(),
             failure,
         }
     }
@@ -313,16 +332,16 @@ impl Playback {
     /// Start of the first frame.
     #[must_use]
     pub fn start(&self) -> Ticks {
-        self.spans.first().map(|span| span.start).unwrap_or_default()
+        self.ladder.start()
     }
 
-    /// End of the last frame.
+    /// End of the last frame; of a live stream, so far.
     #[must_use]
     pub fn end(&self) -> Ticks {
-        self.spans.last().map(|span| span.end).unwrap_or_default()
+        self.ladder.end()
     }
 
-    /// Where the playhead stands.
+    /// Where the play head stands.
     #[must_use]
     pub fn position(&self, now: Duration) -> Ticks {
         self.timescale.ticks_in_nanoseconds(self.clock.position(now))
@@ -339,142 +358,34 @@ impl Playback {
         self.buffer.ready()
     }
 
-    fn state(&self, position: Ticks, failure: Option<&Failure>) -> PlaybackState {
-        match failure {
-            Some(failure) if self.playing && failure.kind == FailureKind::Unreachable => {
-                PlaybackState::Failed
-            }
-            _ if !self.playing && position >= self.end() => PlaybackState::Ended,
-            _ if !self.playing => PlaybackState::Paused,
-            _ if self.clock.is_running() => PlaybackState::Playing,
-            _ => PlaybackState::Buffering,
+    /// A chunk that is at hand, and the representation it came in.
+    #[must_use]
+    pub fn content(&self, chunk: usize) -> Option<(&Arc<C>, usize)> {
+        match self.buffer.slot(chunk)? {
+            Slot::Ready { content, representation, .. } => Some((content, *representation)),
+            _ => None,
         }
     }
 
-    /// Moves time up to `now`, but not past what is missing, and chooses the frame to show.
-    fn advance(&mut self, now: Duration) {
-        if self.clock.is_running() {
-            self.run(now);
-        }
+    /// Whether the stream is still being written.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        self.ladder.live().is_some()
+    }
+
+    /// How well it plays.
+    #[must_use]
+    pub fn stats(&self, now: Duration) -> Stats {
         let position = self.position(now);
-        let (index, _) = self.span_at(position);
-        if self.playing && !self.clock.is_running() && self.passable(index) {
-            self.clock.run(now);
+        let bits = self.estimate.bytes_per_second().map(|bytes| (bytes * 8.0) as u64);
+        Stats {
+            switches: self.chooser.switches(),
+            representation: self.chooser.current(),
+            bits_per_second: bits,
+            ahead: self.at_hand(position).0,
+            buffered_bytes: self.buffer.bytes(),
+            latency: self.is_live().then(|| self.ladder.between(position, self.end())),
+            ..self.counters.at(now)
         }
-        self.buffer.keep(&self.window(index));
-        if let Some(shown) = self.at_hand(position) {
-            self.shown = Some(shown);
-        }
-    }
-
-    /// Stops the running clock at the first chunk that is not there, and at the end.
-    fn run(&mut self, now: Duration) {
-        let (from, to) = (self.clock.settled(), self.clock.position(now));
-        let first = self.span_at(self.timescale.ticks_in_nanoseconds(from)).0;
-        let last = self.span_at(self.timescale.ticks_in_nanoseconds(to)).0;
-        if let Some(missing) = (first..=last).find(|index| !self.passable(*index)) {
-            let start = self.spans.get(missing).map(|span| span.start).unwrap_or_default();
-            self.clock.stand(from.max(self.timescale.nanoseconds(start)));
-            // It may have been given up long before it was due: one more round.
-            self.buffer.forgive_unreachable(missing);
-            return;
-        }
-        if to >= self.timescale.nanoseconds(self.end()) {
-            match self.config.at_end {
-                AtEnd::Hold => {
-                    self.clock.stand(self.timescale.nanoseconds(self.end()));
-                    self.playing = false;
-                }
-                AtEnd::Loop => self.go_to(now, self.start()),
-            }
-            return;
-        }
-        self.clock.settle(now);
-    }
-
-    /// Whether time may run through a chunk: it is at hand, or it will never be readable.
-    fn passable(&self, index: usize) -> bool {
-        match self.buffer.slot(index) {
-            Some(Slot::Ready(_)) => true,
-            Some(Slot::Failed(failure)) => failure.kind == FailureKind::Corrupt,
-            _ => false,
-        }
-    }
-
-    /// Puts the playhead at `target`, inside the match; time stands until [`Playback::advance`] finds the chunk there.
-    fn go_to(&mut self, now: Duration, target: Ticks) {
-        let target = target.clamp(self.start(), self.end());
-        self.clock.stop(now);
-        self.clock.stand(self.timescale.nanoseconds(target));
-        let (index, _) = self.span_at(target);
-        self.buffer.keep(&self.window(index));
-        if !self.buffer.has_or_awaits(index) {
-            self.buffer.next_generation();
-        }
-    }
-
-    fn next_frame(&self, now: Duration) -> Ticks {
-        let position = self.position(now);
-        let here = self.at_hand(position);
-        let next = here.as_ref().and_then(|here| here.chunk.frames.get(here.frame_index + 1));
-        let (index, span) = self.span_at(position);
-        match (next, self.spans.get(index + 1)) {
-            (Some(next), _) => next.start,
-            (None, Some(next)) => next.start,
-            // On the last frame already: stay on it.
-            (None, None) if here.is_some() => position,
-            (None, None) => span.end,
-        }
-    }
-
-    fn previous_frame(&self, now: Duration) -> Ticks {
-        let position = self.position(now);
-        if let Some(here) = self.at_hand(position)
-            && let Some(previous) =
-                here.frame_index.checked_sub(1).and_then(|frame| here.chunk.frames.get(frame))
-        {
-            return previous.start;
-        }
-        let (index, span) = self.span_at(position);
-        let Some(before) = index.checked_sub(1).and_then(|index| self.spans.get(index)) else {
-            return span.start;
-        };
-        // Inside the last frame of the chunk before; its start when that is known.
-        let inside = before.end - Ticks(1);
-        self.at_hand(inside).and_then(|last| Some(last.frame()?.start)).unwrap_or(inside)
-    }
-
-    /// The chunk shown at a moment: the last one that has started, or the first.
-    fn span_at(&self, position: Ticks) -> (usize, Span) {
-        let index = self.spans.partition_point(|span| span.start <= position).saturating_sub(1);
-        let nothing = Span { start: Ticks(0), end: Ticks(0) };
-        (index, self.spans.get(index).copied().unwrap_or(nothing))
-    }
-
-    /// The frame at a moment, when its chunk is at hand.
-    fn at_hand(&self, position: Ticks) -> Option<ShownFrame> {
-        let (chunk_index, _) = self.span_at(position);
-        let Some(Slot::Ready(chunk)) = self.buffer.slot(chunk_index) else { return None };
-        let frame_index = chunk.frame_at(position)?;
-        Some(ShownFrame { chunk: Arc::clone(chunk), chunk_index, frame_index })
-    }
-
-    /// Chunks worth keeping when `index` is shown.
-    fn window(&self, index: usize) -> Vec<usize> {
-        let count = self.spans.len();
-        let ahead = (1..=self.config.ahead).filter_map(|step| match self.config.at_end {
-            AtEnd::Hold => Some(index + step).filter(|index| *index < count),
-            AtEnd::Loop => Some((index + step) % count.max(1)),
-        });
-        let behind = (1..=self.config.behind).filter_map(|step| index.checked_sub(step));
-        std::iter::once(index).chain(ahead).chain(behind).collect()
-    }
-
-    /// Chunks to ask for, most urgent first: those behind are kept but not asked for.
-    fn wanted(&self, now: Duration) -> Vec<usize> {
-        let (index, _) = self.span_at(self.position(now));
-        let mut wanted = self.window(index);
-        wanted.truncate(wanted.len() - index.min(self.config.behind));
-        wanted
     }
 }

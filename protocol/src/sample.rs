@@ -9,9 +9,13 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use crate::{
     camera::Camera,
-    chunk::{Ball, Body, Chunk, ChunkError, ChunkFrame, EncodedImage, FrameQuality, ImageFormat, encode},
+    chunk::{
+        Atlas, Ball, Body, Chunk, ChunkError, ChunkFrame, EncodedImage, FrameQuality, ImageFormat,
+        PixelImage, encode,
+    },
+    compact::{Run, Sequence},
     hash,
-    manifest::{ChunkEntry, FORMAT, Manifest, Person, PersonId, Representation, VERSION},
+    manifest::{ChunkEntry, FORMAT, Manifest, Person, PersonId, Profile, Representation, VERSION},
     mesh::Mesh,
     pitch::Pitch,
     time::{Ticks, Timescale},
@@ -64,7 +68,13 @@ pub fn match_of(frames: u32, people: u32) -> Result<SampleMatch, ChunkError> {
         static_scene: None,
         people: (0..people).map(person).collect(),
         segments: Vec::new(),
-        representations: vec![Representation { id: "high".to_owned(), triangles_per_body: 72, chunks }],
+        live: None,
+        representations: vec![Representation {
+            id: "high".to_owned(),
+            profile: Profile::Plain,
+            triangles_per_body: 72,
+            chunks,
+        }],
     };
     Ok(SampleMatch { manifest, files })
 }
@@ -73,6 +83,39 @@ pub fn match_of(frames: u32, people: u32) -> Result<SampleMatch, ChunkError> {
 #[must_use]
 pub fn chunk_of(first: u32, count: u32, people: u32) -> Chunk {
     Chunk { frames: (first..first + count).map(|frame| frame_of(frame, people)).collect() }
+}
+
+/// The same frames as runs, as the compact profile takes them.
+#[must_use]
+pub fn sequence_of(first: u32, count: u32, people: u32) -> Sequence {
+    let frames: Vec<ChunkFrame> = (first..first + count).map(|frame| frame_of(frame, people)).collect();
+    let column = |person: u32| {
+        let pixels = (0..3 * TILE_PX * TILE_PX).flat_map(|pixel| {
+            let [r, g, b] = colour(pixel / TILE_PX / TILE_PX, person);
+            [r, g, b, 255]
+        });
+        PixelImage { width_px: TILE_PX, height_px: 3 * TILE_PX, rgba: pixels.collect() }
+    };
+    let run = |person: u32| {
+        let bodies: Vec<&Body> =
+            frames.iter().filter_map(|frame| frame.bodies.get(person as usize)).collect();
+        let mut mesh = mesh_of(first, person, people);
+        // From the atlas of all to one's own column.
+        mesh.uvs.iter_mut().for_each(|uv| uv[0] = (uv[0] * people as f32 - person as f32).clamp(0.0, 1.0));
+        Run {
+            person: PersonId(person),
+            frames: (0..count as usize).collect(),
+            anchors_m: bodies.iter().map(|body| body.anchor_m).collect(),
+            positions_m: bodies.iter().map(|body| body.mesh.positions_m.clone()).collect(),
+            textures: vec![column(person); count as usize],
+            guessed_from_u: None,
+            colour: shirt(person),
+            mesh,
+        }
+    };
+    let runs = (0..people).map(run).collect();
+    let bare = |frame: &ChunkFrame| ChunkFrame { atlas: None, bodies: Vec::new(), ..frame.clone() };
+    Sequence { frames: frames.iter().map(bare).collect(), runs }
 }
 
 /// Frame `frame` of the match.
@@ -86,7 +129,7 @@ pub fn frame_of(frame: u32, people: u32) -> ChunkFrame {
         camera: Some(Camera::looking_at((1280, 720), 1400.0, DVec3::new(0.0, 18.0, 75.0), ball)),
         quality: FrameQuality { line_residual_px: Some(1.25), track_confidence: Some(0.75) },
         ball: Some(Ball { position_m: ball, height_known: false, spread: None }),
-        atlas: (people > 0).then(|| atlas(people)),
+        atlas: (people > 0).then(|| Atlas::Encoded(atlas(people))),
         bodies: (0..people)
             .map(|person| Body {
                 person: PersonId(person),
@@ -117,6 +160,15 @@ fn person(index: u32) -> Person {
         number: u8::try_from(index / 2 + 1).ok(),
         number_confidence: None,
         shirt_rgb: Some(shirt(index)),
+    }
+}
+
+/// Of a row of a person's column: skin, shirt, shorts.
+fn colour(row: u32, person: u32) -> [u8; 3] {
+    match row {
+        0 => [205, 150, 120],
+        1 => shirt(person),
+        _ => [235, 235, 240],
     }
 }
 
@@ -170,11 +222,7 @@ fn atlas(people: u32) -> EncodedImage {
     let mut pixels = Vec::with_capacity((width * height * 3) as usize);
     for row in 0..height {
         for column in 0..width {
-            pixels.extend(match row / TILE_PX {
-                0 => [205, 150, 120],
-                1 => shirt(column / TILE_PX),
-                _ => [235, 235, 240],
-            });
+            pixels.extend(colour(row / TILE_PX, column / TILE_PX));
         }
     }
     let mut bytes = Vec::new();

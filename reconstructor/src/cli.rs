@@ -3,7 +3,7 @@
 use std::{net::SocketAddr, ops::Range, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
-use protocol::pitch::Pitch;
+use protocol::{manifest::Profile, pitch::Pitch};
 use reconstructor::{calibration::is_possible, tracking::TrackingMethod};
 use serving::server::{self, ServeOptions, Tls};
 
@@ -35,6 +35,11 @@ pub(crate) enum Command {
     /// Measure results against ground truth.
     #[command(subcommand)]
     Evaluate(Evaluate),
+    /// Write a stream of one profile as one of the other.
+    #[command(
+        after_help = "Example:\n  reconstructor convert stream --profile plain --out plain     # chunks that every glTF viewer plays"
+    )]
+    Convert(Convert),
     /// Serve a stream over HTTP until Ctrl-C.
     #[command(
         after_help = "Examples:\n  reconstructor serve stream --listen 127.0.0.1:8420\n  reconstructor serve stream --listen 0.0.0.0:8420 --tls-cert cert.pem --tls-key key.pem --max-connections 2000"
@@ -59,6 +64,9 @@ pub(crate) struct Reconstruct {
     /// Frames of the clip, from A up to but without B; all when not given.
     #[arg(long, value_name = "A..B", value_parser = frame_range)]
     pub(crate) frames: Option<Range<u32>>,
+    /// How chunks are made: `compact` has three qualities and is small, `plain` plays in every glTF viewer.
+    #[arg(long, value_name = "compact|plain", default_value = "compact", value_parser = profile)]
+    pub(crate) profile: Profile,
     /// Folder that keeps the results of stages, so that interrupted work resumes.
     #[arg(long, value_name = "DIR")]
     pub(crate) work: Option<PathBuf>,
@@ -152,6 +160,11 @@ pub(crate) enum Evaluate {
         after_help = "Example:\n  reconstructor evaluate match --data assets/demo --stream target/demo/stream --json match.json"
     )]
     Match(EvaluateMatch),
+    /// What the compact profile costs and loses, rung by rung, against one Draco mesh and JPEG per frame.
+    #[command(
+        after_help = "Example:\n  reconstructor reconstruct clip.mp4 --profile plain --out plain\n  reconstructor evaluate stream --stream plain --json stream.json"
+    )]
+    Stream(EvaluateStream),
     /// Depth of rendered players against their true depth.
     #[command(after_help = "Example:\n  reconstructor evaluate depth --data heldout --json depth.json")]
     Depth(EvaluateDepth),
@@ -281,6 +294,34 @@ pub(crate) struct EvaluateMatch {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Convert {
+    /// The stream; its best quality is taken.
+    pub(crate) stream: PathBuf,
+    /// How the new stream's chunks are made. To `plain` nothing is lost but a thirtieth of a millimetre.
+    #[arg(long, value_name = "compact|plain", value_parser = profile)]
+    pub(crate) profile: Profile,
+    /// Folder for the new stream; an older stream in it is replaced.
+    #[arg(long, value_name = "STREAM")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateStream {
+    /// A stream of the plain profile: what the codec is given.
+    #[arg(long, value_name = "STREAM")]
+    pub(crate) stream: PathBuf,
+    /// Also draw rate over distortion.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(crate) plot: Option<PathBuf>,
+    /// Measure one chunk of so many; all when not given.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) every: u32,
+    /// Where the figures go.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: PathBuf,
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct EvaluateDepth {
     /// Folder of rendered players with their depth.
     #[arg(long, value_name = "DIR")]
@@ -348,6 +389,14 @@ fn frame_range(text: &str) -> Result<Range<u32>, String> {
 }
 
 /// The name of a way to follow people.
+fn profile(text: &str) -> Result<Profile, String> {
+    match text {
+        "compact" => Ok(Profile::Compact),
+        "plain" => Ok(Profile::Plain),
+        _ => Err(format!("`{text}` is no profile; write compact or plain")),
+    }
+}
+
 fn tracking(text: &str) -> Result<TrackingMethod, String> {
     match text {
         "global" => Ok(TrackingMethod::Global),

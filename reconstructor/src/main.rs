@@ -5,6 +5,7 @@
 mod cli;
 
 use std::{
+    fs,
     io::{IsTerminal, Write},
     path::Path,
     process::ExitCode,
@@ -12,13 +13,13 @@ use std::{
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use protocol::limits::Limits;
+use protocol::{chunk::ChunkFrame, limits::Limits, manifest::ChunkEntry};
 use reconstructor::{
     calibration::{
         ShotFigures,
         command::{self, CalibrateOptions},
     },
-    encode::read_stream,
+    encode::{StreamReader, convert},
     evaluate::{self, air, depth, flicker, frame_truth, matches},
     mesh::MeshBudget,
     pipeline::{ObserveOptions, ReconstructOptions, reconstruct},
@@ -60,6 +61,7 @@ fn run(command: Command) -> Result<()> {
         Command::Calibrate(arguments) => run_calibrate(arguments),
         Command::Synthesize(arguments) => run_synthesize(arguments),
         Command::Evaluate(Evaluate::Match(arguments)) => run_evaluate_match(&arguments),
+        Command::Evaluate(Evaluate::Stream(arguments)) => run_evaluate_stream(&arguments),
         Command::Evaluate(Evaluate::Depth(arguments)) => {
             let progress = Progress::new("depth", 0);
             let figures = depth::depth(&arguments.data, |_| progress.advance(1))?;
@@ -102,6 +104,7 @@ fn run(command: Command) -> Result<()> {
             write_figures(&arguments.json, &evaluate::segmentation::evaluate(&options)?)
         }
         Command::Evaluate(Evaluate::Realism(arguments)) => run_evaluate_realism(&arguments),
+        Command::Convert(arguments) => run_convert(&arguments),
         Command::Serve(arguments) => Ok(serving::server::serve(&arguments.stream, arguments.options())?),
     }
 }
@@ -118,6 +121,7 @@ fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
             threads: threads(arguments.threads),
         },
         out: arguments.out,
+        profile: arguments.profile,
         budget: MeshBudget { triangles: arguments.triangles as usize },
         smoothing: Smoothing::default(),
         overlay: arguments.overlay,
@@ -248,12 +252,63 @@ struct AllFigures {
     air: Option<air::AirFigures>,
 }
 
+fn run_convert(arguments: &cli::Convert) -> Result<()> {
+    // The old chunks go before the new ones come.
+    let same = arguments.out.exists() && arguments.stream.canonicalize()? == arguments.out.canonicalize()?;
+    anyhow::ensure!(!same, "--out is the stream itself: choose another folder");
+    let reader = StreamReader::open(&arguments.stream, &Limits::default())?;
+    let progress = Progress::new("chunks", reader.chunk_count() as u64);
+    let manifest = convert(&reader, &arguments.out, arguments.profile, || progress.advance(1))?;
+    drop(progress);
+    let bytes = |files: &[ChunkEntry]| files.iter().map(|chunk| chunk.file.bytes).sum::<u64>();
+    for representation in &manifest.representations {
+        println!(
+            "{}: {} bytes in {}",
+            representation.id,
+            bytes(&representation.chunks),
+            arguments.out.display()
+        );
+    }
+    Ok(())
+}
+
+fn run_evaluate_stream(arguments: &cli::EvaluateStream) -> Result<()> {
+    let reader = StreamReader::open(&arguments.stream, &Limits::default())?;
+    let chosen = (0..reader.chunk_count()).step_by(arguments.every as usize);
+    let progress = Progress::new("chunks", chosen.len() as u64);
+    let chunks = chosen.map(|index| {
+        progress.advance(1);
+        reader.any_chunk(index).map_err(anyhow::Error::from)
+    });
+    let figures = evaluate::stream::stream(chunks, reader.manifest().timescale)?;
+    drop(progress);
+    if let Some(path) = &arguments.plot {
+        fs::write(path, evaluate::stream_plot::plot(&figures))
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    if let Some(ratio) = figures.bytes_ratio {
+        println!("bytes for one of Draco and JPEG per frame: {ratio:.3}");
+    }
+    for rung in &figures.rungs {
+        println!(
+            "{}: {:.2} Mbit/s, {:.2} mm, {:.1} dB, {:.2} ms",
+            rung.rate.id, rung.rate.mbit_s, rung.rate.error_mm, rung.rate.psnr_db, rung.decode_ms_p50
+        );
+    }
+    write_figures(&arguments.json, &figures)
+}
+
 fn run_evaluate_match(arguments: &cli::EvaluateMatch) -> Result<()> {
     let limits = Limits::default();
     let truth = arguments.data.join("truth");
     let frames = |folder: &Path| -> Result<(_, Vec<_>)> {
-        let (manifest, chunks) = read_stream(folder, &limits)?;
-        Ok((manifest.timescale, chunks.into_iter().flat_map(|chunk| chunk.frames).collect()))
+        let reader = StreamReader::open(folder, &limits)?;
+        let mut frames = Vec::new();
+        for chunk in reader.chunks() {
+            // Textures are not measured here; a whole match of them would not fit in memory.
+            frames.extend(chunk?.frames.into_iter().map(|frame| ChunkFrame { atlas: None, ..frame }));
+        }
+        Ok((reader.manifest().timescale, frames))
     };
     let (timescale, truth) = frames(&truth)
         .context("the true stream cannot be read; --data names the folder that holds truth/")?;

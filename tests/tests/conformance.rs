@@ -8,7 +8,7 @@ use std::{
     process::Command,
 };
 
-use protocol::{chunk, pitch::Pitch, sample};
+use protocol::{chunk, compact, manifest::Profile, pitch::Pitch, sample};
 use reconstructor::encode::{StreamHeader, StreamReader, StreamWriter};
 use serde_json::Value;
 
@@ -73,6 +73,18 @@ fn chunks_are_valid_gltf() {
 }
 
 #[test]
+fn compact_chunks_are_valid_gltf_with_a_mesh_at_rest_for_everybody() {
+    let folder = tempfile::tempdir().unwrap();
+    let sequence = sample::sequence_of(0, 10, 4);
+    let bytes = compact::encode(&sequence, sample::TIMESCALE, &compact::Quality::HIGH).unwrap();
+    let Some(reports) = validate(&[write(folder.path(), "compact.glb", &bytes)]) else { return };
+    assert_valid(&reports);
+    // Only what is known from outside: our extension is no error, and no warning either.
+    assert_eq!(reports[0]["warnings"], 0);
+    assert_eq!(reports[0]["triangles"], 4 * 72);
+}
+
+#[test]
 fn the_pitch_of_a_stream_is_valid_gltf() {
     let folder = tempfile::tempdir().unwrap();
     let header = StreamHeader {
@@ -81,7 +93,7 @@ fn the_pitch_of_a_stream_is_valid_gltf() {
         people: Vec::new(),
         segments: Vec::new(),
     };
-    let mut writer = StreamWriter::create(folder.path(), &header).unwrap();
+    let mut writer = StreamWriter::create(folder.path(), &header, Profile::Plain).unwrap();
     let frame = sample::frame_of(0, 0);
     writer
         .push_frame(reconstructor::encode::StreamFrame {

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use protocol::{chunk::ChunkFrame, limits::Limits};
+use protocol::{chunk::ChunkFrame, limits::Limits, manifest::Profile};
 use reconstructor::{
     encode::{StreamReader, read_stream},
     evaluate::matches,
@@ -49,6 +49,7 @@ fn run(out: &Path, work: &Path) -> ReconstructReport {
             threads: 2,
         },
         out: out.to_owned(),
+        profile: Profile::Compact,
         budget: MeshBudget::default(),
         smoothing: Smoothing::default(),
         overlay: Some(out.with_extension("overlay")),

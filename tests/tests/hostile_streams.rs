@@ -5,8 +5,11 @@
 
 use std::{fs, path::Path};
 
+use player::scene::FrameScene;
 use protocol::{
     chunk::ChunkError,
+    compact,
+    content::AnyChunk,
     hash::{self, HashError},
     limits::Limits,
     manifest::{FILE_NAME, Manifest, ManifestError},
@@ -117,6 +120,27 @@ fn flipped_bits_with_a_hash_that_agrees_never_panic() {
             assert!(matches!(error, StreamError::Chunk { .. } | StreamError::Times { .. }), "{error}");
         }
     }
+}
+
+#[test]
+fn ten_thousand_changes_of_a_compact_chunk_reach_the_players_scene_or_an_error() {
+    let good =
+        compact::encode(&sample::sequence_of(0, 4, 2), sample::TIMESCALE, &compact::Quality::HIGH).unwrap();
+    let limits = Limits::default();
+    let mut read = 0;
+    for change in 0..10_000_usize {
+        let mut bytes = good.clone();
+        // Strides that share no factor with the length visit every byte.
+        let at = (change * 7_919) % bytes.len();
+        bytes[at] = bytes[at].wrapping_add([1, 0x80, 0xFF, 0x55][change % 4]);
+        let Ok(chunk) = AnyChunk::decode(&bytes, &limits) else { continue };
+        read += 1;
+        for index in 0..chunk.frames().len() {
+            FrameScene::new(&chunk.frame(index).unwrap(), &[], &limits).unwrap();
+        }
+    }
+    // Names and colours are not checked; nearly everything else is.
+    assert!((100..5_000).contains(&read), "{read} of 10000 were read");
 }
 
 #[test]

@@ -11,7 +11,7 @@ pub(crate) fn run(stream: bool) -> Result<()> {
     // The same build as that of the tests: another selection of packages would compile everything again.
     cargo(&["build", "--workspace", "--all-targets"])?;
     if stream {
-        demo::reconstruct("assets/demo/excerpt", &["--frames", "0..6"])?;
+        demo::reconstruct("assets/demo/excerpt", &["--frames", "0..6", "--profile", "plain"])?;
     }
     test::cargo_test(&["--test", "golden", "--test", "headset"], "HOLOPITCH_UPDATE_GOLDENS")
 }

@@ -41,8 +41,12 @@ enum Command {
         #[arg(long)]
         stream: bool,
     },
-    /// Measure decode, upload, draw and seek of the demo stream
-    Bench,
+    /// Measure the player, or the stream
+    Bench {
+        /// Which
+        #[arg(default_value = "player")]
+        what: bench::What,
+    },
     /// Make a data set under target/datasets
     Dataset {
         /// Which one
@@ -59,7 +63,7 @@ fn main() -> ExitCode {
         Command::Demo { no_window } => demo::run(no_window),
         Command::Test => test::run(),
         Command::Goldens { stream } => goldens::run(stream),
-        Command::Bench => bench::run(),
+        Command::Bench { what } => bench::run(what),
         Command::Dataset { name, count } => dataset::run(name, count),
     };
     match result {

@@ -79,15 +79,18 @@ pub(super) fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
     let mut first_frame = None;
     let mut keys = Vec::new();
     for index in 0..stream.chunks().len() {
-        let loaded = runtime.block_on(stream.chunk(index))?;
+        let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
         fetch.push(loaded.fetch);
         verify.push(loaded.verify);
         decode.push(loaded.decode);
-        geometry.push(loaded.decode / loaded.chunk.frames.len().max(1) as u32);
-        for (place, frame) in loaded.chunk.frames.iter().enumerate() {
+        geometry.push(loaded.decode / loaded.chunk.frames().len().max(1) as u32);
+        for place in 0..loaded.chunk.frames().len() {
             keys.push((index, place));
-            let scene = build.time(|| FrameScene::new(frame, &people, &limits));
-            let scene = scene.with_context(|| stream.chunk_name(index))?;
+            let scene = build.time(|| {
+                loaded.chunk.frame(place).map(|frame| FrameScene::new(&frame, &people, &limits)).transpose()
+            });
+            let scene = scene.with_context(|| stream.chunk_name(stream.best(), index))?;
+            let scene = scene.context("the chunk has fewer frames than it says")?;
             upload.time(|| {
                 renderer.upload(&gpu.device, &gpu.queue, &scene);
                 gpu.queue.submit([]);
@@ -104,9 +107,9 @@ pub(super) fn run(arguments: &BenchArguments) -> anyhow::Result<()> {
         // A stride near the golden ratio visits the whole stream without pattern.
         let Some(&(index, place)) = keys.get((step * 618 + 309) % 1000 * keys.len() / 1000) else { break };
         seek.time(|| -> anyhow::Result<()> {
-            let loaded = runtime.block_on(stream.chunk(index))?;
-            let frame = loaded.chunk.frames.get(place).context("the stream changed while it was measured")?;
-            let scene = FrameScene::new(frame, &people, &limits)?;
+            let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
+            let frame = loaded.chunk.frame(place).context("the stream changed while it was measured")?;
+            let scene = FrameScene::new(&frame, &people, &limits)?;
             renderer.upload(&gpu.device, &gpu.queue, &scene);
             gpu.draw(&renderer, &target, &camera)?;
             Ok(())

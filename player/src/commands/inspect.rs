@@ -6,8 +6,15 @@ use std::{
 };
 
 use anyhow::Context;
-use protocol::chunk;
+use protocol::{
+    chunk::{self, ChunkError},
+    compact,
+    content::AnyChunk,
+    limits::Limits,
+};
 use serde::Serialize;
+
+use player::source::LoadedChunk;
 
 const EXAMPLES: &str = "Examples:
   player inspect target/demo/stream
@@ -45,6 +52,8 @@ struct Figures {
     chunk_bytes: usize,
     geometry_bytes: usize,
     texture_bytes: usize,
+    /// How points and textures change, in compact chunks.
+    motion_bytes: usize,
     index_bytes: usize,
     bytes_per_body_frame: f64,
     megabits_per_second: f64,
@@ -74,21 +83,21 @@ pub(super) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
         chunk_bytes: 0,
         geometry_bytes: 0,
         texture_bytes: 0,
+        motion_bytes: 0,
         index_bytes: 0,
         bytes_per_body_frame: 0.0,
         megabits_per_second: 0.0,
         hashes_verified: 0,
     };
     for index in 0..stream.chunks().len() {
-        let loaded = runtime.block_on(stream.chunk(index))?;
+        let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
         figures.hashes_verified += 1;
-        let split =
-            chunk::byte_split(&loaded.file, stream.limits()).with_context(|| stream.chunk_name(index))?;
         figures.chunk_bytes += loaded.file.len();
-        figures.geometry_bytes += split.geometry;
-        figures.texture_bytes += split.texture;
-        figures.index_bytes += split.index;
-        for frame in &loaded.chunk.frames {
+        figures
+            .add_bytes(&loaded, stream.limits())
+            .with_context(|| stream.chunk_name(stream.best(), index))?;
+        for place in 0..loaded.chunk.frames().len() {
+            let Some(frame) = loaded.chunk.frame(place) else { continue };
             figures.frames += 1;
             figures.first_clip_frame.get_or_insert(frame.clip_frame);
             figures.last_clip_frame = Some(frame.clip_frame);
@@ -111,6 +120,27 @@ pub(super) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
         super::write_json(path, &figures)?;
     }
     Ok(())
+}
+
+impl Figures {
+    /// Adds how the bytes of a chunk divide.
+    fn add_bytes(&mut self, loaded: &LoadedChunk, limits: &Limits) -> Result<(), ChunkError> {
+        match &loaded.chunk {
+            AnyChunk::Plain(_) => {
+                let split = chunk::byte_split(&loaded.file, limits)?;
+                self.geometry_bytes += split.geometry;
+                self.texture_bytes += split.texture;
+                self.index_bytes += split.index;
+            }
+            AnyChunk::Compact(_) => {
+                let parts = compact::byte_parts(&loaded.file, limits)?;
+                self.geometry_bytes += parts.rest;
+                self.motion_bytes += parts.motion;
+                self.index_bytes += parts.head + parts.index;
+            }
+        }
+        Ok(())
+    }
 }
 
 fn print(figures: &Figures, out: &mut impl Write) -> io::Result<()> {
@@ -138,10 +168,11 @@ fn print(figures: &Figures, out: &mut impl Write) -> io::Result<()> {
     )?;
     writeln!(
         out,
-        "  bytes      {} in chunks: {:.0} % geometry, {:.0} % texture, {:.0} % index; {:.0} per person and frame",
+        "  bytes      {} in chunks: {:.0} % geometry, {:.0} % texture, {:.0} % motion, {:.0} % index; {:.0} per person and frame",
         figures.chunk_bytes,
         share(figures.geometry_bytes),
         share(figures.texture_bytes),
+        share(figures.motion_bytes),
         share(figures.index_bytes),
         figures.bytes_per_body_frame
     )?;

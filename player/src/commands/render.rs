@@ -137,10 +137,10 @@ pub(super) fn find_frame(
 ) -> anyhow::Result<(String, ChunkFrame)> {
     let mut first = 0_usize;
     for index in 0..stream.chunks().len() {
-        let loaded = runtime.block_on(stream.chunk(index))?;
-        let count = loaded.chunk.frames.len();
-        if let Some(frame) = loaded.chunk.frames.into_iter().nth(wanted as usize - first) {
-            return Ok((stream.chunk_name(index), frame));
+        let loaded = runtime.block_on(stream.chunk(stream.best(), index))?;
+        let count = loaded.chunk.frames().len();
+        if let Some(frame) = loaded.chunk.frame(wanted as usize - first) {
+            return Ok((stream.chunk_name(stream.best(), index), frame.into_owned()));
         }
         first += count;
     }

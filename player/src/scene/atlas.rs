@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use image::{DynamicImage, ImageReader, RgbaImage, imageops};
 use protocol::{
-    chunk::{EncodedImage, ImageFormat},
+    chunk::{self, EncodedImage, ImageFormat},
     limits::Limits,
 };
 use thiserror::Error;
@@ -43,6 +43,20 @@ pub enum AtlasError {
 }
 
 impl Atlas {
+    /// The atlas of a frame, of either profile.
+    pub fn of(atlas: &chunk::Atlas, limits: &Limits) -> Result<Self, AtlasError> {
+        match atlas {
+            chunk::Atlas::Encoded(file) => Self::decode(file, limits),
+            chunk::Atlas::Pixels(pixels) => {
+                let (width_px, height_px) = (pixels.width_px, pixels.height_px);
+                // The decoder made it: its pixels fit its size.
+                let picture =
+                    RgbaImage::from_raw(width_px, height_px, pixels.rgba.clone()).unwrap_or_default();
+                Ok(Self::from_image(DynamicImage::ImageRgba8(picture)))
+            }
+        }
+    }
+
     /// Decodes an encoded atlas; its size is checked before anything is allocated for its pixels.
     pub fn decode(encoded: &EncodedImage, limits: &Limits) -> Result<Self, AtlasError> {
         let format = match encoded.format {

@@ -71,7 +71,7 @@ pub struct FrameScene {
 impl FrameScene {
     /// Builds the scene of a decoded frame: world positions, shadows, and the atlas decoded within `limits`.
     pub fn new(frame: &ChunkFrame, people: &[Person], limits: &Limits) -> Result<Self, AtlasError> {
-        let atlas = frame.atlas.as_ref().map(|encoded| Atlas::decode(encoded, limits)).transpose()?;
+        let atlas = frame.atlas.as_ref().map(|atlas| Atlas::of(atlas, limits)).transpose()?;
         let mut scene = Self {
             clip_frame: frame.clip_frame,
             camera: frame.camera,

@@ -1,4 +1,5 @@
-//! Loads a stream beside the user interface: one thread fetches and decodes chunks, one builds frames.
+//! Loads a stream beside the user interface: one thread fetches and decodes chunks (and reads the manifest of a
+//! live stream again), one builds frames.
 //!
 //! Callers say what they want, most urgent first; a new list replaces the old one, so that a scrub over the whole
 //! match does not leave a queue of stale work behind.
@@ -9,9 +10,10 @@ use std::{
         mpsc::{self, Receiver, Sender},
     },
     thread,
+    time::{Duration, Instant},
 };
 
-use protocol::{chunk::Chunk, limits::Limits, manifest::Manifest, playback::Request};
+use protocol::{content::AnyChunk, limits::Limits, manifest::Manifest, playback::Request};
 
 use super::{Location, SourceError, Stream};
 use crate::scene::FrameScene;
@@ -36,9 +38,11 @@ pub enum Event {
     Chunk {
         /// What was asked.
         request: Request,
-        /// Its content, or why it is not there.
-        result: Result<Arc<Chunk>, SourceError>,
+        /// Its content and how it came, or why it is not there.
+        result: Result<Fetched, SourceError>,
     },
+    /// The manifest of a live stream was read again.
+    Manifest(Result<Box<Manifest>, SourceError>),
     /// A frame is ready to be uploaded.
     Frame {
         /// Which.
@@ -48,11 +52,40 @@ pub enum Event {
     },
 }
 
+/// A chunk that came.
+#[derive(Debug)]
+pub struct Fetched {
+    /// Its content.
+    pub chunk: Arc<AnyChunk>,
+    /// Length of its file.
+    pub bytes: u64,
+    /// How long reading or downloading it took.
+    pub fetch: Duration,
+    /// When its last byte was there.
+    pub finished: Instant,
+}
+
+/// What the first thread does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Work {
+    Manifest,
+    Chunk(Request),
+}
+
+/// What a frame is built from.
+#[derive(Clone, Debug)]
+pub struct FrameSource {
+    /// The chunk that the frame lies in.
+    pub chunk: Arc<AnyChunk>,
+    /// The representation that the chunk came in, for messages.
+    pub representation: usize,
+}
+
 /// A stream that is being loaded.
 pub struct Loader {
     events: Receiver<Event>,
-    chunks: Arc<Wanted<Request, ()>>,
-    frames: Arc<Wanted<FrameKey, Arc<Chunk>>>,
+    work: Arc<Wanted<Work, ()>>,
+    frames: Arc<Wanted<FrameKey, FrameSource>>,
     retries: Arc<Wanted<(), ()>>,
 }
 
@@ -65,16 +98,15 @@ impl Loader {
     ) -> Result<Self, SourceError> {
         let (sender, events) = mpsc::channel();
         let report = Report { sender, wake: Arc::new(wake) };
-        let loader = Self { events, chunks: Arc::default(), frames: Arc::default(), retries: Arc::default() };
-        let (chunks, frames, retries) =
-            (loader.chunks.clone(), loader.frames.clone(), loader.retries.clone());
+        let loader = Self { events, work: Arc::default(), frames: Arc::default(), retries: Arc::default() };
+        let (work, frames, retries) = (loader.work.clone(), loader.frames.clone(), loader.retries.clone());
         let runtime =
             tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(SourceError::Start)?;
         thread::Builder::new()
             .name("stream".to_owned())
             .spawn(move || {
                 let Some(stream) = open(&runtime, &location, limits, &retries, &report) else { return };
-                let stream = Arc::new(stream);
+                let stream = Arc::new(Mutex::new(Arc::new(stream)));
                 let (frame_stream, frame_report) = (stream.clone(), report.clone());
                 let builder = thread::Builder::new().name("frames".to_owned());
                 if let Err(error) = builder.spawn(move || build_frames(&frame_stream, &frames, &frame_report))
@@ -82,23 +114,33 @@ impl Loader {
                     report.send(Event::NotOpened(SourceError::Start(error)));
                     return;
                 }
-                while let Some((request, ())) = chunks.next() {
-                    let result = runtime.block_on(stream.chunk(request.chunk));
-                    let result = result.map(|loaded| Arc::new(loaded.chunk));
-                    report.send(Event::Chunk { request, result });
+                while let Some((item, ())) = work.next() {
+                    // What is not wanted any more must not keep waiting what is.
+                    let doing = async {
+                        tokio::select! {
+                            event = carry_out(item, &stream) => Some(event),
+                            () = work.current_dropped() => None,
+                        }
+                    };
+                    if let Some(event) = runtime.block_on(doing) {
+                        report.send(event);
+                    }
                 }
             })
             .map_err(SourceError::Start)?;
         Ok(loader)
     }
 
-    /// Replaces the list of chunks to load, most urgent first.
-    pub fn want_chunks(&self, wanted: &[Request]) {
-        self.chunks.replace(wanted.iter().map(|&request| (request, ())).collect());
+    /// Replaces the list of what to load: the manifest again or not, and chunks, most urgent first. What is being loaded
+    /// and is not in the list is stopped.
+    pub fn want(&self, manifest: bool, chunks: &[Request]) {
+        let manifest = manifest.then_some((Work::Manifest, ()));
+        let chunks = chunks.iter().map(|&request| (Work::Chunk(request), ()));
+        self.work.replace(manifest.into_iter().chain(chunks).collect());
     }
 
     /// Replaces the list of frames to build, most urgent first.
-    pub fn want_frames(&self, wanted: Vec<(FrameKey, Arc<Chunk>)>) {
+    pub fn want_frames(&self, wanted: Vec<(FrameKey, FrameSource)>) {
         self.frames.replace(wanted);
     }
 
@@ -116,7 +158,7 @@ impl Loader {
 
 impl Drop for Loader {
     fn drop(&mut self) {
-        self.chunks.close();
+        self.work.close();
         self.frames.close();
         self.retries.close();
     }
@@ -156,12 +198,51 @@ fn open(
     }
 }
 
-fn build_frames(stream: &Stream, wanted: &Wanted<FrameKey, Arc<Chunk>>, report: &Report) {
-    while let Some((key, chunk)) = wanted.next() {
-        let Some(frame) = chunk.frames.get(key.frame) else { continue };
-        let scene = FrameScene::new(frame, &stream.manifest.people, stream.limits());
+/// The stream as its newest manifest tells it.
+fn newest(stream: &Mutex<Arc<Stream>>) -> MutexGuard<'_, Arc<Stream>> {
+    stream.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+async fn carry_out(work: Work, stream: &Mutex<Arc<Stream>>) -> Event {
+    let current = newest(stream).clone();
+    match work {
+        Work::Manifest => Event::Manifest(current.read_again().await.map(|updated| {
+            let manifest = Box::new(updated.manifest.clone());
+            // An older copy from some cache must not make chunks disappear.
+            if has_all_of(&updated.manifest, &current.manifest) {
+                *newest(stream) = Arc::new(updated);
+            }
+            manifest
+        })),
+        Work::Chunk(request) => {
+            let result = current.chunk(request.representation, request.chunk).await;
+            let result = result.map(|loaded| Fetched {
+                bytes: loaded.file.len() as u64,
+                fetch: loaded.fetch,
+                finished: loaded.started + loaded.fetch,
+                chunk: Arc::new(loaded.chunk),
+            });
+            Event::Chunk { request, result }
+        }
+    }
+}
+
+/// Whether a manifest has at least as many chunks as another in every representation.
+fn has_all_of(new: &Manifest, old: &Manifest) -> bool {
+    let counts = |manifest: &Manifest| {
+        manifest.representations.iter().map(|item| item.chunks.len()).collect::<Vec<_>>()
+    };
+    let (new, old) = (counts(new), counts(old));
+    new.len() == old.len() && new.iter().zip(&old).all(|(new, old)| new >= old)
+}
+
+fn build_frames(stream: &Mutex<Arc<Stream>>, wanted: &Wanted<FrameKey, FrameSource>, report: &Report) {
+    while let Some((key, FrameSource { chunk, representation })) = wanted.next() {
+        let Some(frame) = chunk.frame(key.frame) else { continue };
+        let stream = newest(stream).clone();
+        let scene = FrameScene::new(&frame, &stream.manifest.people, stream.limits());
         let result = scene.map(Arc::new).map_err(|problem| SourceError::Atlas {
-            file: stream.chunk_name(key.chunk),
+            file: stream.chunk_name(representation, key.chunk),
             clip_frame: frame.clip_frame,
             problem,
         });
@@ -173,19 +254,23 @@ fn build_frames(stream: &Stream, wanted: &Wanted<FrameKey, Arc<Chunk>>, report: 
 struct Wanted<K, T> {
     state: Mutex<State<K, T>>,
     changed: Condvar,
+    /// Told when what is being worked on is wanted no more.
+    dropped: tokio::sync::Notify,
 }
 
 struct State<K, T> {
     items: Vec<(K, T)>,
     /// What is being worked on; not taken up again while it is.
     current: Option<K>,
+    /// Whether the newest list has it no more.
+    current_dropped: bool,
     closed: bool,
 }
 
 impl<K, T> Default for Wanted<K, T> {
     fn default() -> Self {
-        let state = State { items: Vec::new(), current: None, closed: false };
-        Self { state: Mutex::new(state), changed: Condvar::new() }
+        let state = State { items: Vec::new(), current: None, current_dropped: false, closed: false };
+        Self { state: Mutex::new(state), changed: Condvar::new(), dropped: tokio::sync::Notify::new() }
     }
 }
 
@@ -199,6 +284,10 @@ impl<K: Copy + PartialEq, T> Wanted<K, T> {
         wanted.reverse();
         let mut state = self.lock();
         let current = state.current;
+        state.current_dropped = current.is_some_and(|current| wanted.iter().all(|(key, _)| *key != current));
+        if state.current_dropped {
+            self.dropped.notify_one();
+        }
         wanted.retain(|(key, _)| Some(*key) != current);
         state.items = wanted;
         self.changed.notify_one();
@@ -207,7 +296,7 @@ impl<K: Copy + PartialEq, T> Wanted<K, T> {
     /// The most urgent item, waiting for one; `None` when the list was closed.
     fn next(&self) -> Option<(K, T)> {
         let mut state = self.lock();
-        state.current = None;
+        (state.current, state.current_dropped) = (None, false);
         loop {
             if state.closed {
                 return None;
@@ -220,9 +309,25 @@ impl<K: Copy + PartialEq, T> Wanted<K, T> {
         }
     }
 
+    /// Waits until what is being worked on is wanted no more, or nothing is.
+    async fn current_dropped(&self) {
+        loop {
+            let (dropped, closed) = {
+                let state = self.lock();
+                (state.current_dropped, state.closed)
+            };
+            if dropped || closed {
+                return;
+            }
+            // It may have been meant for the item before: look again.
+            self.dropped.notified().await;
+        }
+    }
+
     fn close(&self) {
         self.lock().closed = true;
         self.changed.notify_all();
+        self.dropped.notify_one();
     }
 }
 
@@ -240,5 +345,18 @@ mod tests {
         wanted.close();
         wanted.replace(vec![(9, ())]);
         assert_eq!(wanted.next(), None);
+    }
+
+    #[tokio::test]
+    async fn what_is_wanted_no_more_is_stopped_and_nothing_else() {
+        let wanted = Wanted::default();
+        wanted.replace(vec![(1, ()), (2, ())]);
+        assert_eq!(wanted.next(), Some((1, ())));
+        wanted.replace(vec![(2, ())]);
+        wanted.current_dropped().await;
+        assert_eq!(wanted.next(), Some((2, ())));
+        wanted.replace(vec![(2, ()), (3, ())]);
+        let waiting = tokio::time::timeout(Duration::from_millis(20), wanted.current_dropped());
+        assert!(waiting.await.is_err(), "2 is still wanted");
     }
 }

@@ -13,10 +13,10 @@ pub use location::Location;
 use std::time::{Duration, Instant};
 
 use protocol::{
-    chunk::{self, Chunk},
+    content::AnyChunk,
     hash,
     limits::Limits,
-    manifest::{ChunkEntry, FILE_NAME, Manifest, Representation},
+    manifest::{ChunkEntry, FILE_NAME, Manifest, Profile},
 };
 
 /// A stream that was opened: its manifest was read and makes sense.
@@ -25,8 +25,6 @@ pub struct Stream {
     limits: Limits,
     /// What the stream holds.
     pub manifest: Manifest,
-    /// The representation that is played: the best.
-    representation: Representation,
     /// Bytes of the manifest.
     pub manifest_bytes: usize,
 }
@@ -35,9 +33,11 @@ pub struct Stream {
 #[derive(Clone, Debug)]
 pub struct LoadedChunk {
     /// The content.
-    pub chunk: Chunk,
+    pub chunk: AnyChunk,
     /// The file as it came.
     pub file: Vec<u8>,
+    /// When it was asked for.
+    pub started: Instant,
     /// Reading or downloading it.
     pub fetch: Duration,
     /// Comparing its hash.
@@ -51,26 +51,40 @@ impl Stream {
     pub async fn open(location: Location, limits: Limits) -> Result<Self, SourceError> {
         let bytes = location.fetch(FILE_NAME, limits.manifest_bytes).await?;
         let broken = |problem| SourceError::Manifest { file: location.name_of(FILE_NAME), problem };
-        let manifest = Manifest::from_json(&bytes, &limits).map_err(broken)?;
-        let Some(representation) = manifest.representations.last().cloned() else {
-            return Err(SourceError::Empty { file: location.name_of(FILE_NAME) });
-        };
-        if representation.chunks.is_empty() {
+        let mut manifest = Manifest::from_json(&bytes, &limits).map_err(broken)?;
+        // What a newer program wrote in a way of its own is no rung for this one.
+        manifest.representations.retain(|representation| representation.profile != Profile::Other);
+        if manifest.representations.iter().all(|item| item.chunks.is_empty()) {
             return Err(SourceError::Empty { file: location.name_of(FILE_NAME) });
         }
-        Ok(Self { location, limits, manifest, representation, manifest_bytes: bytes.len() })
+        Ok(Self { location, limits, manifest, manifest_bytes: bytes.len() })
     }
 
-    /// The chunks of the representation that is played, in order of time.
+    /// Reads the manifest again, for a stream that grows.
+    pub async fn read_again(&self) -> Result<Self, SourceError> {
+        Self::open(self.location.clone(), self.limits).await
+    }
+
+    /// Index of the best representation.
+    #[must_use]
+    pub fn best(&self) -> usize {
+        self.manifest.representations.len().saturating_sub(1)
+    }
+
+    /// The chunks of the best representation, in order of time.
     #[must_use]
     pub fn chunks(&self) -> &[ChunkEntry] {
-        &self.representation.chunks
+        self.chunks_of(self.best())
     }
 
-    /// The name of the representation that is played.
+    /// The name of the best representation.
     #[must_use]
     pub fn representation(&self) -> &str {
-        &self.representation.id
+        self.manifest.best().map_or("", |best| best.id.as_str())
+    }
+
+    fn chunks_of(&self, representation: usize) -> &[ChunkEntry] {
+        self.manifest.representations.get(representation).map_or(&[], |item| item.chunks.as_slice())
     }
 
     /// Where the stream is.
@@ -87,15 +101,16 @@ impl Stream {
 
     /// The full name of a chunk's file, for messages.
     #[must_use]
-    pub fn chunk_name(&self, index: usize) -> String {
-        let path = self.chunks().get(index).map_or("?", |entry| entry.file.path.as_str());
-        self.location.name_of(path)
+    pub fn chunk_name(&self, representation: usize, index: usize) -> String {
+        let entry = self.chunks_of(representation).get(index);
+        self.location.name_of(entry.map_or("?", |entry| entry.file.path.as_str()))
     }
 
-    /// Fetches, verifies and decodes a chunk.
-    pub async fn chunk(&self, index: usize) -> Result<LoadedChunk, SourceError> {
-        let Some(entry) = self.chunks().get(index) else {
-            return Err(SourceError::NoSuchChunk { index, count: self.chunks().len() });
+    /// Fetches, verifies and decodes a chunk of a representation.
+    pub async fn chunk(&self, representation: usize, index: usize) -> Result<LoadedChunk, SourceError> {
+        let chunks = self.chunks_of(representation);
+        let Some(entry) = chunks.get(index) else {
+            return Err(SourceError::NoSuchChunk { index, count: chunks.len() });
         };
         let limit = self.limits.chunk_bytes;
         let asked = Instant::now();
@@ -105,14 +120,15 @@ impl Stream {
         hash::verify(&file, &entry.file)
             .map_err(|problem| SourceError::Hash { file: location(), problem })?;
         let verified = Instant::now();
-        let chunk = chunk::decode(&file, &self.limits)
+        let chunk = AnyChunk::decode(&file, &self.limits)
             .map_err(|problem| SourceError::Chunk { file: location(), problem })?;
-        if chunk.frames.is_empty() {
+        if chunk.frames().is_empty() {
             return Err(SourceError::EmptyChunk { file: location() });
         }
         Ok(LoadedChunk {
             chunk,
             file,
+            started: asked,
             fetch: fetched - asked,
             verify: verified - fetched,
             decode: verified.elapsed(),

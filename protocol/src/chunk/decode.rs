@@ -7,8 +7,8 @@ use glam::Vec3;
 use serde::Deserialize;
 
 use super::{
-    Body, Chunk, ChunkError, ChunkFrame, EncodedImage, ImageFormat, draco, guessed_is_possible,
-    index::{ChunkIndex, FrameIndex, LAYOUT, PersonTrack, SceneExtras},
+    Atlas, Body, Chunk, ChunkError, ChunkFrame, EncodedImage, ImageFormat, draco, guessed_is_possible,
+    index::{ChunkIndex, LAYOUT, PersonTrack, SceneExtras},
 };
 use crate::{
     glb::Glb,
@@ -63,8 +63,8 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Chunk, ChunkError> {
     if index.frames.is_empty() {
         return Err(ChunkError::Empty);
     }
-    check_times(&index.frames)?;
-    let mut budget = Budget { left: limits.decoded_bytes_per_chunk, limit: limits.decoded_bytes_per_chunk };
+    check_times(index.frames.iter().map(|frame| (frame.start, frame.duration)))?;
+    let mut budget = Budget::new(limits.decoded_bytes_per_chunk);
     let mut frames = Vec::with_capacity(index.frames.len());
     for (position, entry) in index.frames.iter().enumerate() {
         ChunkError::check("bodies in a frame", entry.bodies.len(), limits.bodies_per_frame)?;
@@ -97,7 +97,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Chunk, ChunkError> {
             camera: entry.camera.as_deref().copied(),
             quality: entry.quality,
             ball: entry.ball,
-            atlas,
+            atlas: atlas.map(Atlas::Encoded),
             bodies,
         });
     }
@@ -124,26 +124,31 @@ pub fn byte_split(bytes: &[u8], limits: &Limits) -> Result<ByteSplit, ChunkError
     Ok(split)
 }
 
-fn check_times(frames: &[FrameIndex]) -> Result<(), ChunkError> {
+/// Refuses frames, given by start and duration, that are not one after the other.
+pub(crate) fn check_times(frames: impl Iterator<Item = (Ticks, Ticks)>) -> Result<(), ChunkError> {
     let mut earliest = Ticks(i64::MIN);
-    for (frame, entry) in frames.iter().enumerate() {
-        if entry.duration <= Ticks(0) || entry.start < earliest {
+    for (frame, (start, duration)) in frames.enumerate() {
+        if duration <= Ticks(0) || start < earliest {
             let problem = "it overlaps the frame before, or lasts no time";
             return Err(ChunkError::Frame { frame, problem });
         }
-        earliest = entry.start + entry.duration;
+        earliest = start + duration;
     }
     Ok(())
 }
 
 /// What may still be decoded: a few bytes can name the same large mesh or picture many times.
-struct Budget {
+pub(crate) struct Budget {
     left: usize,
     limit: usize,
 }
 
 impl Budget {
-    fn spend(&mut self, bytes: usize) -> Result<(), ChunkError> {
+    pub(crate) fn new(limit: usize) -> Self {
+        Self { left: limit, limit }
+    }
+
+    pub(crate) fn spend(&mut self, bytes: usize) -> Result<(), ChunkError> {
         match self.left.checked_sub(bytes) {
             Some(left) => self.left = left,
             None => {
@@ -186,13 +191,8 @@ impl<'a> File<'a> {
 
     /// The bytes of a buffer view.
     fn view(&self, index: usize) -> Result<&'a [u8], ChunkError> {
-        let fail = reference("buffer view", index);
-        let Some(view) = self.document.buffer_views.get(index) else { return Err(fail) };
-        let end = view.byte_offset.checked_add(view.byte_length);
-        match end.and_then(|end| self.bin.get(view.byte_offset..end)) {
-            Some(bytes) if view.buffer == 0 => Ok(bytes),
-            _ => Err(fail),
-        }
+        let view = self.document.buffer_views.get(index).ok_or(reference("buffer view", index))?;
+        view.of(self.bin).ok_or(reference("buffer view", index))
     }
 
     fn image(&self, index: usize, limits: &Limits, budget: &mut Budget) -> Result<EncodedImage, ChunkError> {
@@ -220,37 +220,14 @@ impl<'a> File<'a> {
     ) -> Result<Body, ChunkError> {
         let anchor_m = self.anchor(track.anchors, frame)?;
         let fail = |problem: String| ChunkError::Body { frame, person: track.id, problem };
-        let primitive = match self.document.meshes.get(mesh).map(|mesh| mesh.primitives.as_slice()) {
-            Some([primitive]) => primitive,
-            _ => return Err(reference("mesh with one primitive", mesh)),
-        };
-        let draco_part = primitive
-            .extensions
-            .as_ref()
-            .and_then(|all| all.draco.as_ref())
-            .ok_or_else(|| fail("its mesh is not Draco-compressed".to_owned()))?;
-        let count = |accessor: usize| {
-            let found = self.document.accessors.get(accessor);
-            found.map(|accessor| accessor.count).ok_or(reference("accessor", accessor))
-        };
-        let no_uv = || fail("its mesh has no texture coordinates".to_owned());
-        let vertices = count(primitive.attributes.position)?;
-        if count(primitive.attributes.uv.ok_or_else(no_uv)?)? != vertices {
-            return Err(fail("its accessors disagree about the number of vertices".to_owned()));
-        }
-        let indices = count(primitive.indices.ok_or_else(|| fail("its mesh has no indices".to_owned()))?)?;
-        if !indices.is_multiple_of(3) {
-            return Err(fail(format!("{indices} indices are not whole triangles")));
-        }
-        let counts = draco::Counts { vertices, triangles: indices / 3 };
-        ChunkError::check("vertices in a body", counts.vertices, limits.vertices_per_body)?;
-        ChunkError::check("triangles in a body", counts.triangles, limits.triangles_per_body)?;
-        budget.spend(counts.vertices * draco::VERTEX_BYTES + counts.triangles * draco::TRIANGLE_BYTES)?;
-        let ids = draco::AttributeIds {
-            position: draco_part.attributes.position,
-            uv: draco_part.attributes.uv.ok_or_else(no_uv)?,
-        };
-        let mesh = draco::decode(self.view(draco_part.buffer_view)?, ids, counts).map_err(fail)?;
+        let one = self.document.meshes.get(mesh).filter(|mesh| mesh.primitives.len() == 1);
+        let mesh = one.ok_or(reference("mesh with one primitive", mesh))?;
+        let view = |index| self.view(index);
+        let mesh =
+            body_mesh(mesh, &self.document.accessors, view, limits, budget).map_err(|error| match error {
+                BodyError::Chunk(error) => error,
+                BodyError::Problem(problem) => fail(problem),
+            })?;
         Ok(Body { person: track.id, anchor_m, mesh, guessed_from_u: None })
     }
 
@@ -274,6 +251,57 @@ impl<'a> File<'a> {
     }
 }
 
-fn reference(what: &'static str, index: usize) -> ChunkError {
+/// What is wrong with a body: with the whole chunk, or with it alone.
+pub(crate) enum BodyError {
+    Chunk(ChunkError),
+    Problem(String),
+}
+
+impl From<ChunkError> for BodyError {
+    fn from(error: ChunkError) -> Self {
+        Self::Chunk(error)
+    }
+}
+
+/// The geometry of a glTF mesh with one Draco-compressed primitive; `view` gives the bytes of a buffer view.
+pub(crate) fn body_mesh<'a>(
+    mesh: &Mesh,
+    accessors: &[Accessor],
+    view: impl Fn(usize) -> Result<&'a [u8], ChunkError>,
+    limits: &Limits,
+    budget: &mut Budget,
+) -> Result<crate::mesh::Mesh, BodyError> {
+    let fail = |problem: &str| BodyError::Problem(problem.to_owned());
+    let [primitive] = mesh.primitives.as_slice() else {
+        return Err(fail("its mesh has not one primitive"));
+    };
+    let draco_part = primitive
+        .extensions
+        .as_ref()
+        .and_then(|all| all.draco.as_ref())
+        .ok_or_else(|| fail("its mesh is not Draco-compressed"))?;
+    let count =
+        |index: usize| accessors.get(index).map(|found| found.count).ok_or(reference("accessor", index));
+    let no_uv = || fail("its mesh has no texture coordinates");
+    let vertices = count(primitive.attributes.position)?;
+    if count(primitive.attributes.uv.ok_or_else(no_uv)?)? != vertices {
+        return Err(fail("its accessors disagree about the number of vertices"));
+    }
+    let indices = count(primitive.indices.ok_or_else(|| fail("its mesh has no indices"))?)?;
+    if !indices.is_multiple_of(3) {
+        return Err(BodyError::Problem(format!("{indices} indices are not whole triangles")));
+    }
+    let counts = draco::Counts { vertices, triangles: indices / 3 };
+    ChunkError::check("vertices in a body", counts.vertices, limits.vertices_per_body)?;
+    ChunkError::check("triangles in a body", counts.triangles, limits.triangles_per_body)?;
+    budget.spend(counts.vertices * draco::VERTEX_BYTES + counts.triangles * draco::TRIANGLE_BYTES)?;
+    let ids = draco::AttributeIds {
+        position: draco_part.attributes.position,
+        uv: draco_part.attributes.uv.ok_or_else(no_uv)?,
+    };
+    draco::decode(view(draco_part.buffer_view)?, ids, counts).map_err(BodyError::Problem)
+}
+
+pub(crate) fn reference(what: &'static str, index: usize) -> ChunkError {
     ChunkError::Reference { what, index }
 }

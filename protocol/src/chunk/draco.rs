@@ -9,38 +9,38 @@ use super::Quantisation;
 use crate::mesh::Mesh;
 
 /// Draco's id of the position attribute in files written here.
-pub(super) const POSITION_ID: usize = 0;
+pub(crate) const POSITION_ID: usize = 0;
 /// Draco's id of the texture coordinates in files written here.
-pub(super) const UV_ID: usize = 1;
+pub(crate) const UV_ID: usize = 1;
 
 /// Bytes of one decoded vertex (three plus two floats).
-pub(super) const VERTEX_BYTES: usize = 20;
+pub(crate) const VERTEX_BYTES: usize = 20;
 /// Bytes of one decoded triangle.
-pub(super) const TRIANGLE_BYTES: usize = 12;
+pub(crate) const TRIANGLE_BYTES: usize = 12;
 
 /// Encoder speed, 0 smallest to 10 fastest; the README says what it costs.
 const SPEED: i32 = 4;
 
 /// What a compressed mesh says it holds; the decoded one must hold exactly this.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Counts {
-    pub(super) vertices: usize,
-    pub(super) triangles: usize,
+pub(crate) struct Counts {
+    pub(crate) vertices: usize,
+    pub(crate) triangles: usize,
 }
 
 /// Which Draco attribute carries what.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AttributeIds {
-    pub(super) position: usize,
-    pub(super) uv: usize,
+pub(crate) struct AttributeIds {
+    pub(crate) position: usize,
+    pub(crate) uv: usize,
 }
 
 /// Compresses a mesh. Vertices may come back in another order and unused ones do not come back.
-pub(super) fn encode(mesh: &Mesh, quantisation: Quantisation) -> Result<Vec<u8>, String> {
+pub(crate) fn encode(mesh: &Mesh, quantisation: Quantisation) -> Result<Vec<u8>, String> {
     encode_at(mesh, quantisation, SPEED)
 }
 
-fn encode_at(mesh: &Mesh, quantisation: Quantisation, speed: i32) -> Result<Vec<u8>, String> {
+pub(crate) fn encode_at(mesh: &Mesh, quantisation: Quantisation, speed: i32) -> Result<Vec<u8>, String> {
     check(mesh)?;
     // Draco drops triangles that name a vertex twice; so do we, to know what it will keep.
     let triangles: Vec<u32> =
@@ -94,7 +94,7 @@ fn check(mesh: &Mesh) -> Result<(), String> {
 }
 
 /// Decompresses a mesh that says it has `counts`; the caller has checked those against its limits.
-pub(super) fn decode(bytes: &[u8], ids: AttributeIds, counts: Counts) -> Result<Mesh, String> {
+pub(crate) fn decode(bytes: &[u8], ids: AttributeIds, counts: Counts) -> Result<Mesh, String> {
     // Other encoders may add normals or colours: room for them, but no more.
     let attribute_bytes = counts.vertices.saturating_mul(VERTEX_BYTES).saturating_mul(3) as u64;
     let limits = DecodeLimits::default()
@@ -115,7 +115,7 @@ pub(super) fn decode(bytes: &[u8], ids: AttributeIds, counts: Counts) -> Result<
 }
 
 /// Decompresses a mesh just written here, to learn what a reader will see.
-pub(super) fn decode_own(bytes: &[u8]) -> Result<Mesh, String> {
+pub(crate) fn decode_own(bytes: &[u8]) -> Result<Mesh, String> {
     let mut decoded = draco_core::Mesh::new();
     MeshDecoder::new()
         .decode(&mut DecoderBuffer::new(bytes), &mut decoded)

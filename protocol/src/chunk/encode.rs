@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    Body, Chunk, ChunkError, ChunkFrame, draco, guessed_is_possible,
+    Atlas, Body, Chunk, ChunkError, ChunkFrame, EncodedImage, draco, guessed_is_possible,
     index::{ChunkIndex, FrameIndex, LAYOUT, PersonTrack, SceneExtras},
 };
 use crate::{
@@ -57,7 +57,7 @@ pub fn encode_with(
 }
 
 /// Order of time, one body per person, and nothing that JSON cannot say.
-fn check_frames(frames: &[ChunkFrame]) -> Result<(), ChunkError> {
+pub(crate) fn check_frames(frames: &[ChunkFrame]) -> Result<(), ChunkError> {
     if frames.is_empty() {
         return Err(ChunkError::Empty);
     }
@@ -77,8 +77,14 @@ fn check_frames(frames: &[ChunkFrame]) -> Result<(), ChunkError> {
                 "the camera, the ball, an anchor or a figure is not a number, or the ball is nowhere near",
             ));
         }
-        if content.atlas.as_ref().is_some_and(|atlas| atlas.size_px().is_none()) {
-            return Err(problem("the atlas is not a picture of the format it says"));
+        match &content.atlas {
+            Some(Atlas::Encoded(file)) if file.size_px().is_none() => {
+                return Err(problem("the atlas is not a picture of the format it says"));
+            }
+            Some(Atlas::Pixels(_)) => {
+                return Err(problem("the atlas is not a picture file: encode it first"));
+            }
+            _ => {}
         }
     }
     Ok(())
@@ -132,7 +138,7 @@ impl<'a> Writer<'a> {
     /// Atlases, their materials, and the index entry of every frame.
     fn pictures(&mut self) {
         for frame in &self.chunk.frames {
-            let image = frame.atlas.as_ref().map(|atlas| {
+            let image = frame.atlas.as_ref().and_then(file_of).map(|atlas| {
                 let buffer_view = self.builder.view(&atlas.bytes, None);
                 let image = Image { buffer_view, mime_type: atlas.format.mime_type().to_owned() };
                 self.builder.document.images.push(image);
@@ -206,43 +212,12 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    /// The mesh of one body; its accessors say what a reader will really find in the Draco data.
+    /// The mesh of one body.
     fn mesh(&mut self, frame: usize, body: &Body, material: usize) -> Result<usize, ChunkError> {
         let fail = |problem| ChunkError::Body { frame, person: body.person, problem };
         let bytes = draco::encode(&body.mesh, self.quantisation).map_err(fail)?;
         let stored = draco::decode_own(&bytes).map_err(fail)?;
-        let buffer_view = self.builder.view(&bytes, None);
-        let vertices = stored.positions_m.len();
-        let accessor = |component_type, count, kind: &str| Accessor {
-            buffer_view: None,
-            byte_offset: 0,
-            component_type,
-            count,
-            kind: kind.to_owned(),
-            min: Vec::new(),
-            max: Vec::new(),
-        };
-        let (min, max) = bounds(&stored.positions_m);
-        let position =
-            self.builder.accessor(Accessor { min, max, ..accessor(component::F32, vertices, "VEC3") });
-        let uv = self.builder.accessor(accessor(component::F32, vertices, "VEC2"));
-        // The largest 16-bit index is reserved.
-        let index_type = if vertices <= usize::from(u16::MAX) { component::U16 } else { component::U32 };
-        let indices = self.builder.accessor(accessor(index_type, stored.triangles.len() * 3, "SCALAR"));
-        let extension = DracoExtension {
-            buffer_view,
-            attributes: Attributes { position: draco::POSITION_ID, uv: Some(draco::UV_ID), normal: None },
-        };
-        self.builder.document.meshes.push(Mesh {
-            name: String::new(),
-            primitives: vec![Primitive {
-                attributes: Attributes { position, uv: Some(uv), normal: None },
-                indices: Some(indices),
-                material: Some(material),
-                extensions: Some(PrimitiveExtensions { draco: Some(extension) }),
-            }],
-        });
-        Ok(self.builder.document.meshes.len() - 1)
+        Ok(draco_mesh(&mut self.builder, &bytes, &stored, material))
     }
 
     /// The animation sampler that shows something during one frame only.
@@ -360,6 +335,54 @@ impl<'a> Writer<'a> {
             document.animations = vec![self.animation];
         }
         Ok(self.builder.finish()?)
+    }
+}
+
+/// Adds a mesh whose geometry is the Draco data `bytes`, which decodes to `stored`; its accessors say what a reader will really find there.
+pub(crate) fn draco_mesh(
+    builder: &mut Builder,
+    bytes: &[u8],
+    stored: &crate::mesh::Mesh,
+    material: usize,
+) -> usize {
+    let buffer_view = builder.view(bytes, None);
+    let vertices = stored.positions_m.len();
+    let accessor = |component_type, count, kind: &str| Accessor {
+        buffer_view: None,
+        byte_offset: 0,
+        component_type,
+        count,
+        kind: kind.to_owned(),
+        min: Vec::new(),
+        max: Vec::new(),
+    };
+    let (min, max) = bounds(&stored.positions_m);
+    let position = builder.accessor(Accessor { min, max, ..accessor(component::F32, vertices, "VEC3") });
+    let uv = builder.accessor(accessor(component::F32, vertices, "VEC2"));
+    // The largest 16-bit index is reserved.
+    let index_type = if vertices <= usize::from(u16::MAX) { component::U16 } else { component::U32 };
+    let indices = builder.accessor(accessor(index_type, stored.triangles.len() * 3, "SCALAR"));
+    let extension = DracoExtension {
+        buffer_view,
+        attributes: Attributes { position: draco::POSITION_ID, uv: Some(draco::UV_ID), normal: None },
+    };
+    builder.document.meshes.push(Mesh {
+        name: String::new(),
+        primitives: vec![Primitive {
+            attributes: Attributes { position, uv: Some(uv), normal: None },
+            indices: Some(indices),
+            material: Some(material),
+            extensions: Some(PrimitiveExtensions { draco: Some(extension) }),
+        }],
+    });
+    builder.document.meshes.len() - 1
+}
+
+/// The file of an atlas; frames with another kind are refused before.
+fn file_of(atlas: &Atlas) -> Option<&EncodedImage> {
+    match atlas {
+        Atlas::Encoded(file) => Some(file),
+        Atlas::Pixels(_) => None,
     }
 }
 

@@ -58,6 +58,12 @@ pub enum ChunkError {
         /// What is wrong.
         problem: String,
     },
+    /// A part of a compact chunk is not what its name says.
+    #[error("the chunk's {what} is corrupt: fetch it again or rebuild the stream")]
+    Corrupt {
+        /// Which part.
+        what: &'static str,
+    },
     /// There is nothing to store.
     #[error("a chunk needs at least one frame")]
     Empty,
@@ -65,7 +71,7 @@ pub enum ChunkError {
 
 impl ChunkError {
     /// Fails when `found` exceeds `limit`.
-    pub(super) fn check(what: &'static str, found: usize, limit: usize) -> Result<(), Self> {
+    pub(crate) fn check(what: &'static str, found: usize, limit: usize) -> Result<(), Self> {
         if found > limit {
             return Err(Self::Limit { what, found: found as u64, limit: limit as u64 });
         }

@@ -3,7 +3,7 @@
 //! [`encode`] and [`decode`] are the only ways in and out; the layout of the file is in this crate's README.
 
 mod decode;
-mod draco;
+pub(crate) mod draco;
 mod encode;
 mod error;
 mod index;
@@ -18,10 +18,25 @@ pub use self::{
     error::ChunkError,
 };
 
+pub(crate) use self::{
+    decode::{BodyError, Budget, body_mesh, check_times, reference},
+    encode::{check_frames, draco_mesh},
+};
+
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{camera::Camera, manifest::PersonId, mesh::Mesh, time::Ticks};
+
+/// One mesh as Draco stores it, and what a reader gets back: for measuring. `speed` is 0 (smallest) to 10 (fastest).
+///
+/// # Errors
+/// When the mesh cannot be stored, in words.
+pub fn geometry(mesh: &Mesh, quantisation: Quantisation, speed: u8) -> Result<(Vec<u8>, Mesh), String> {
+    let bytes = draco::encode_at(mesh, quantisation, i32::from(speed))?;
+    let stored = draco::decode_own(&bytes)?;
+    Ok((bytes, stored))
+}
 
 /// One decoded chunk.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,8 +78,8 @@ pub struct ChunkFrame {
     pub quality: FrameQuality,
     /// The ball, when it is known.
     pub ball: Option<Ball>,
-    /// The texture of all bodies of this frame, still encoded.
-    pub atlas: Option<EncodedImage>,
+    /// The texture of all bodies of this frame.
+    pub atlas: Option<Atlas>,
     /// The people that have a mesh in this frame.
     pub bodies: Vec<Body>,
 }
@@ -111,6 +126,26 @@ impl Ball {
         let spread = |m: f32| (0.0..=Self::FARTHEST_M as f32).contains(&m);
         place && self.spread.is_none_or(|s| spread(s.along_m) && spread(s.across_m))
     }
+}
+
+/// The texture of a frame's bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Atlas {
+    /// As a file, as plain chunks hold it.
+    Encoded(EncodedImage),
+    /// As pixels, as compact chunks give it.
+    Pixels(PixelImage),
+}
+
+/// A picture that needs no decoding.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PixelImage {
+    /// Pixels in a row.
+    pub width_px: u32,
+    /// Rows.
+    pub height_px: u32,
+    /// Red, green, blue and 255 of each pixel, sRGB, row by row from the top.
+    pub rgba: Vec<u8>,
 }
 
 /// An encoded picture in a format that glTF allows.
@@ -165,7 +200,7 @@ pub struct Body {
 }
 
 /// Whether a texture coordinate is one, when there is one.
-fn guessed_is_possible(from_u: Option<f32>) -> bool {
+pub(crate) fn guessed_is_possible(from_u: Option<f32>) -> bool {
     from_u.is_none_or(|u| (0.0..=1.0).contains(&u))
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{FileEntry, Manifest, ManifestError, Representation};
+use super::{ChunkEntry, FileEntry, Manifest, ManifestError, Representation};
 use crate::{limits::Limits, time::Ticks};
 
 /// Longest path, in bytes.
@@ -74,6 +74,31 @@ pub(super) fn manifest(manifest: &Manifest, limits: &Limits) -> Result<(), Manif
             return Err(value("representations", "names an id twice"));
         }
         representation(item, manifest.duration, limits)?;
+    }
+    if manifest.live.is_some_and(|live| live.update_after <= Ticks(0)) {
+        return Err(value("live.update_after", "is not a time to wait"));
+    }
+    same_times(manifest)
+}
+
+/// Playback changes the representation from chunk to chunk: chunk *n* of all of them must be the same part of the match.
+fn same_times(manifest: &Manifest) -> Result<(), ManifestError> {
+    let Some(longest) = manifest.representations.iter().max_by_key(|item| item.chunks.len()) else {
+        return Ok(());
+    };
+    for item in &manifest.representations {
+        let differs = |(a, b): (&ChunkEntry, &ChunkEntry)| (a.start, a.duration) != (b.start, b.duration);
+        if let Some(index) = item.chunks.iter().zip(&longest.chunks).position(differs) {
+            let field = format!("{}.chunks[{index}]", item.id);
+            return Err(value(field, "is at another time than in the other representations"));
+        }
+        if item.chunks.len() < longest.chunks.len() && manifest.live.is_none() {
+            let field = format!("{}.chunks", item.id);
+            return Err(value(
+                field,
+                "are fewer than in another representation: only in a live stream may they",
+            ));
+        }
     }
     Ok(())
 }

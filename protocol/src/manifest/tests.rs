@@ -139,6 +139,46 @@ fn impossible_values_are_named() {
     }
 }
 
+/// The sample's manifest with a second, lower representation, which is changed too.
+fn with_a_second(change: impl Fn(&mut Value)) -> Result<Manifest, ManifestError> {
+    changed(|document| {
+        let mut low = document["representations"][0].clone();
+        low["id"] = "low".into();
+        document["representations"].as_array_mut().unwrap().insert(0, low);
+        change(document);
+    })
+}
+
+#[test]
+fn representations_have_chunks_at_the_same_times() {
+    assert_eq!(with_a_second(|_| ()).unwrap().representations.len(), 2);
+    let shifted = with_a_second(|document| {
+        document["representations"][0]["chunks"][1]["duration"] = 10.into();
+    });
+    let message = shifted.unwrap_err().to_string();
+    assert!(message.contains("low.chunks[1]") || message.contains("high.chunks[1]"), "{message}");
+    assert!(message.contains("another time"), "{message}");
+    let shorten = |document: &mut Value| {
+        document["representations"][0]["chunks"].as_array_mut().unwrap().pop();
+    };
+    let message = with_a_second(shorten).unwrap_err().to_string();
+    assert!(message.contains("low.chunks are fewer"), "{message}");
+    let live = with_a_second(|document| {
+        shorten(document);
+        document["live"] = json!({ "update_after": 30_000 });
+    });
+    assert_eq!(live.unwrap().live, Some(Live { update_after: Ticks(30_000) }));
+}
+
+#[test]
+fn a_stream_is_complete_unless_it_says_that_it_is_live() {
+    assert_eq!(good().live, None);
+    assert!(!good().to_json().unwrap().contains("live"));
+    let message =
+        changed(|document| document["live"] = json!({ "update_after": 0 })).unwrap_err().to_string();
+    assert!(message.contains("live.update_after"), "{message}");
+}
+
 #[test]
 fn limits_come_before_everything() {
     let text = good().to_json().unwrap();

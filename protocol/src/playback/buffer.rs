@@ -1,17 +1,23 @@
-//! The chunks around the playhead: at hand, on their way, to be tried again, or given up.
+//! The chunks around the play head: at hand, on their way, to be tried again, or given up.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use super::PlaybackConfig;
-use crate::chunk::Chunk;
+use super::{
+    RetryConfig,
+    backoff::{self, SplitMix64},
+};
 
 /// A chunk to fetch and decode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Request {
-    /// Given back with the answer; answers to older generations are ignored.
+    /// Answers to older generations are ignored.
     pub generation: u64,
-    /// Index of the chunk in the representation.
+    /// Index of the chunk in the stream.
     pub chunk: usize,
+    /// Index of the representation to take it from.
+    pub representation: usize,
+    /// Counts the requests: no two are the same, so that the answer to an attempt that was given up is known as such.
+    pub serial: u64,
 }
 
 /// What became of an answer.
@@ -46,24 +52,62 @@ pub struct Failure {
     pub message: String,
 }
 
+/// A request that is not answered yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct UnderWay {
+    pub(super) request: Request,
+    pub(super) attempt: u32,
+    pub(super) bytes: u64,
+    pub(super) asked: Duration,
+    /// When it is given up.
+    pub(super) deadline: Duration,
+}
+
 /// What is known of one chunk.
-#[derive(Clone, Debug)]
-pub(super) enum Slot {
-    InFlight { generation: u64, attempt: u32 },
-    Retry { attempt: u32, at: Duration },
-    Ready(Arc<Chunk>),
+#[derive(Debug)]
+pub(super) enum Slot<C> {
+    InFlight(UnderWay),
+    Retry {
+        /// Attempts made.
+        attempt: u32,
+        at: Duration,
+        /// No better representation than this one.
+        ceiling: usize,
+    },
+    Ready {
+        content: Arc<C>,
+        representation: usize,
+        bytes: u64,
+    },
     Failed(Failure),
 }
 
-/// See the module.
-#[derive(Debug, Default)]
-pub(super) struct Buffer {
-    slots: BTreeMap<usize, Slot>,
-    generation: u64,
+/// A chunk that may be asked for now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Due {
+    pub(super) chunk: usize,
+    /// Which attempt it would be, from 1 on.
+    pub(super) attempt: u32,
+    pub(super) ceiling: usize,
 }
 
-impl Buffer {
-    pub(super) fn slot(&self, chunk: usize) -> Option<&Slot> {
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Buffer<C> {
+    slots: BTreeMap<usize, Slot<C>>,
+    generation: u64,
+    serial: u64,
+    retry: RetryConfig,
+    random: SplitMix64,
+}
+
+impl<C> Buffer<C> {
+    pub(super) fn new(retry: RetryConfig) -> Self {
+        let random = SplitMix64::new(retry.seed);
+        Self { slots: BTreeMap::new(), generation: 0, serial: 0, retry, random }
+    }
+
+    pub(super) fn slot(&self, chunk: usize) -> Option<&Slot<C>> {
         self.slots.get(&chunk)
     }
 
@@ -72,7 +116,22 @@ impl Buffer {
     }
 
     pub(super) fn ready(&self) -> impl Iterator<Item = usize> + '_ {
-        self.slots.iter().filter(|(_, slot)| matches!(slot, Slot::Ready(_))).map(|(chunk, _)| *chunk)
+        self.slots.iter().filter(|(_, slot)| matches!(slot, Slot::Ready { .. })).map(|(chunk, _)| *chunk)
+    }
+
+    /// Bytes at hand and on their way.
+    pub(super) fn bytes(&self) -> u64 {
+        let each = self.slots.keys().filter_map(|chunk| self.bytes_of(*chunk));
+        each.fold(0, u64::saturating_add)
+    }
+
+    /// Bytes of one chunk, when it is at hand, on its way or given up.
+    pub(super) fn bytes_of(&self, chunk: usize) -> Option<u64> {
+        match self.slots.get(&chunk)? {
+            Slot::InFlight(UnderWay { bytes, .. }) | Slot::Ready { bytes, .. } => Some(*bytes),
+            Slot::Failed(_) => Some(0),
+            Slot::Retry { .. } => None,
+        }
     }
 
     /// Forgets chunks outside `window`.
@@ -81,13 +140,13 @@ impl Buffer {
     }
 
     pub(super) fn has_or_awaits(&self, chunk: usize) -> bool {
-        matches!(self.slots.get(&chunk), Some(Slot::Ready(_) | Slot::InFlight { .. }))
+        matches!(self.slots.get(&chunk), Some(Slot::Ready { .. } | Slot::InFlight(_)))
     }
 
     /// From now on only answers to new requests count.
     pub(super) fn next_generation(&mut self) {
         self.generation += 1;
-        self.slots.retain(|_, slot| matches!(slot, Slot::Ready(_)));
+        self.slots.retain(|_, slot| matches!(slot, Slot::Ready { .. }));
     }
 
     /// Gives failed chunks another round of attempts.
@@ -102,35 +161,61 @@ impl Buffer {
         self.slots.retain(|_, slot| !matches!(slot, Slot::Failed(failure) if unreachable(failure)));
     }
 
-    /// The first of `wanted` that may be asked for now.
-    pub(super) fn next_request(
-        &mut self,
-        now: Duration,
-        wanted: &[usize],
-        in_flight: usize,
-    ) -> Option<Request> {
-        let busy = self.slots.values().filter(|slot| matches!(slot, Slot::InFlight { .. })).count();
-        if busy >= in_flight.max(1) {
-            return None;
-        }
-        let generation = self.generation;
-        let (chunk, attempt) = wanted.iter().find_map(|chunk| match self.slots.get(chunk) {
-            None => Some((*chunk, 1)),
-            Some(Slot::Retry { attempt, at }) if *at <= now => Some((*chunk, attempt + 1)),
-            _ => None,
-        })?;
-        self.slots.insert(chunk, Slot::InFlight { generation, attempt });
-        Some(Request { generation, chunk })
+    /// Whether one more fetch may start.
+    pub(super) fn has_room(&self, in_flight: usize) -> bool {
+        self.under_way().count() < in_flight.max(1)
     }
 
-    pub(super) fn deliver(&mut self, request: Request, chunk: Arc<Chunk>) -> Delivery {
-        match self.awaited(request) {
-            Some(_) => {
-                self.slots.insert(request.chunk, Slot::Ready(chunk));
-                Delivery::Taken
+    pub(super) fn under_way(&self) -> impl Iterator<Item = &UnderWay> + '_ {
+        self.slots.values().filter_map(|slot| match slot {
+            Slot::InFlight(under_way) => Some(under_way),
+            _ => None,
+        })
+    }
+
+    /// The first of `wanted` that may be asked for now.
+    pub(super) fn next_due(&self, now: Duration, wanted: &[usize]) -> Option<Due> {
+        wanted.iter().find_map(|&chunk| match self.slots.get(&chunk) {
+            None => Some(Due { chunk, attempt: 1, ceiling: usize::MAX }),
+            Some(&Slot::Retry { attempt, at, ceiling }) if at <= now => {
+                Some(Due { chunk, attempt: attempt + 1, ceiling })
             }
-            None => Delivery::Stale,
+            _ => None,
+        })
+    }
+
+    /// Notes that a chunk is asked for.
+    pub(super) fn ask(
+        &mut self,
+        now: Duration,
+        due: Due,
+        representation: usize,
+        bytes: u64,
+        patience: Duration,
+    ) -> Request {
+        self.serial += 1;
+        let request =
+            Request { generation: self.generation, chunk: due.chunk, representation, serial: self.serial };
+        // A deadline in the past would ask for ever without waiting.
+        let deadline = now.saturating_add(patience.max(Duration::from_millis(1)));
+        let under_way = UnderWay { request, attempt: due.attempt, bytes, asked: now, deadline };
+        self.slots.insert(due.chunk, Slot::InFlight(under_way));
+        request
+    }
+
+    /// What is known of a request whose answer is still waited for.
+    pub(super) fn awaited(&self, request: Request) -> Option<UnderWay> {
+        match self.slots.get(&request.chunk) {
+            Some(Slot::InFlight(under_way)) if under_way.request == request => Some(*under_way),
+            _ => None,
         }
+    }
+
+    pub(super) fn deliver(&mut self, request: Request, content: Arc<C>) -> Delivery {
+        let Some(UnderWay { bytes, .. }) = self.awaited(request) else { return Delivery::Stale };
+        let representation = request.representation;
+        self.slots.insert(request.chunk, Slot::Ready { content, representation, bytes });
+        Delivery::Taken
     }
 
     pub(super) fn fail(
@@ -139,35 +224,56 @@ impl Buffer {
         request: Request,
         kind: FailureKind,
         message: String,
-        config: &PlaybackConfig,
     ) -> Delivery {
-        let Some(attempt) = self.awaited(request) else { return Delivery::Stale };
-        let slot = if attempt >= config.attempts {
-            Slot::Failed(Failure { chunk: request.chunk, kind, attempts: attempt, message })
-        } else {
-            let wait = config.retry_after.saturating_mul(1 << (attempt - 1).min(10));
-            Slot::Retry { attempt, at: now.saturating_add(wait) }
+        let Some(UnderWay { attempt, .. }) = self.awaited(request) else { return Delivery::Stale };
+        let wait = backoff::wait(attempt, self.retry.wait, self.retry.longest_wait, &mut self.random);
+        // Another file may be whole where this one is not.
+        let ceiling = match kind {
+            FailureKind::Corrupt => request.representation.saturating_sub(1),
+            FailureKind::Unreachable => request.representation,
         };
-        self.slots.insert(request.chunk, slot);
+        self.try_again(request.chunk, attempt, now.saturating_add(wait), ceiling, kind, message);
         Delivery::Taken
     }
 
-    /// When the earliest chunk is to be tried again.
-    pub(super) fn next_retry(&self) -> Option<Duration> {
+    /// Gives up one request whose deadline has passed: it is asked for again at once, lower. Call until `None`.
+    pub(super) fn expire(&mut self, now: Duration) -> Option<UnderWay> {
+        let late = *self.under_way().find(|under_way| under_way.deadline <= now)?;
+        let message = format!("no answer within {:.1} s", now.saturating_sub(late.asked).as_secs_f64());
+        let lower = late.request.representation.saturating_sub(1);
+        self.try_again(late.request.chunk, late.attempt, now, lower, FailureKind::Unreachable, message);
+        Some(late)
+    }
+
+    /// When something happens by itself: a chunk is tried again, or given up.
+    pub(super) fn next_event(&self, may_ask: bool) -> Option<Duration> {
         let times = self.slots.values().filter_map(|slot| match slot {
-            Slot::Retry { at, .. } => Some(*at),
+            // Without room it is the answer to another request that makes it go on.
+            Slot::Retry { at, .. } if may_ask => Some(*at),
+            Slot::InFlight(under_way) => Some(under_way.deadline),
             _ => None,
         });
         times.min()
     }
 
-    /// Which attempt a request is, when its answer is still waited for.
-    fn awaited(&self, request: Request) -> Option<u32> {
-        match self.slots.get(&request.chunk) {
-            Some(Slot::InFlight { generation, attempt }) if *generation == request.generation => {
-                Some(*attempt)
-            }
-            _ => None,
-        }
+    fn try_again(
+        &mut self,
+        chunk: usize,
+        attempt: u32,
+        at: Duration,
+        ceiling: usize,
+        kind: FailureKind,
+        message: String,
+    ) {
+        let most = match kind {
+            FailureKind::Unreachable => self.retry.attempts,
+            FailureKind::Corrupt => self.retry.corrupt_attempts,
+        };
+        let slot = if attempt >= most {
+            Slot::Failed(Failure { chunk, kind, attempts: attempt, message })
+        } else {
+            Slot::Retry { attempt, at, ceiling }
+        };
+        self.slots.insert(chunk, slot);
     }
 }

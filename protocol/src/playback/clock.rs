@@ -87,6 +87,12 @@ impl Clock {
         self.since = None;
     }
 
+    /// Goes on, standing or running, from a position that is reached at `now`.
+    pub(super) fn jump(&mut self, now: Duration, position_ns: u64) {
+        self.settled_ns = position_ns;
+        self.since = self.since.map(|since| since.max(now));
+    }
+
     pub(super) fn set_speed(&mut self, now: Duration, speed: Speed) {
         self.settle(now);
         self.speed = speed;

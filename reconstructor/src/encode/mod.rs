@@ -4,8 +4,12 @@
 //! else is on disk, the manifest. [`StreamReader`] reads such a folder back and trusts none of it.
 
 mod atlas;
+mod convert;
 mod files;
+mod folder;
+mod ladder;
 mod reader;
+mod sequence;
 mod static_scene;
 mod writer;
 
@@ -21,9 +25,13 @@ use protocol::{
     time::{Ticks, Timescale},
 };
 
+pub(crate) use self::atlas::Atlas;
 pub use self::{
+    convert::{ConvertError, convert},
     files::FileError,
+    ladder::{LADDER, Rung},
     reader::{StreamReader, read_stream},
+    sequence::sequence_of,
     writer::StreamWriter,
 };
 use crate::mesh::BodySurface;
@@ -74,6 +82,9 @@ pub enum EncodeError {
         /// Why not.
         source: ChunkError,
     },
+    /// A body cannot be stored, or what was stored cannot be read.
+    #[error("the codec failed: {0}")]
+    Codec(ChunkError),
     /// The pitch cannot be stored.
     #[error("cannot write the pitch: {0}")]
     StaticScene(#[from] GlbError),

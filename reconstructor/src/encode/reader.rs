@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use protocol::{
-    chunk::{self, Chunk},
+    chunk::Chunk,
+    content::AnyChunk,
     hash,
     limits::Limits,
     manifest::{self, FileEntry, Manifest, Representation},
+    playback::Content,
 };
 
 use super::{StreamError, files};
@@ -44,17 +46,25 @@ impl StreamReader {
         self.best().map_or(0, |best| best.chunks.len())
     }
 
-    /// Chunk `index` of the best representation.
+    /// Chunk `index` of the best representation, with all its frames.
     ///
     /// # Errors
     /// When the file is missing, is not the one that the manifest names, or cannot be decoded.
     pub fn chunk(&self, index: usize) -> Result<Chunk, StreamError> {
+        self.any_chunk(index).map(AnyChunk::into_frames)
+    }
+
+    /// Chunk `index` of the best representation, as it is stored.
+    ///
+    /// # Errors
+    /// As [`StreamReader::chunk`].
+    pub fn any_chunk(&self, index: usize) -> Result<AnyChunk, StreamError> {
         let entry = self.best().and_then(|best| best.chunks.get(index)).ok_or_else(|| {
             let path = self.folder.join(manifest::FILE_NAME);
             StreamError::NoChunk { path, index, count: self.chunk_count() }
         })?;
         let (path, bytes) = self.file(&entry.file)?;
-        let chunk = chunk::decode(&bytes, &self.limits)
+        let chunk = AnyChunk::decode(&bytes, &self.limits)
             .map_err(|source| StreamError::Chunk { path: path.clone(), source })?;
         if chunk.span() != Some((entry.start, entry.start + entry.duration)) {
             return Err(StreamError::Times { path });

@@ -1,65 +1,55 @@
 //! Frames to the files of a stream, one chunk of about a second at a time.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeSet, path::Path};
 
 use protocol::{
-    chunk::{self, Body, Chunk, ChunkFrame},
-    hash,
-    limits::Limits,
-    manifest::{self, ChunkEntry, FileEntry, Manifest, PersonId, Representation, Segment},
+    chunk::{Atlas as FrameAtlas, Body, Chunk, ChunkFrame, Quantisation},
+    compact::Sequence,
+    manifest::{Manifest, PersonId, Profile, Segment},
     mesh::Mesh,
     time::Ticks,
 };
 
-use super::{EncodeError, FileError, StreamFrame, StreamHeader, atlas::Atlas, files, static_scene};
-use crate::mesh::BodySurface;
+use super::{
+    EncodeError, StreamFrame, StreamHeader,
+    atlas::Atlas,
+    folder::{Content, StreamFolder},
+    sequence::runs,
+    static_scene,
+};
+use crate::{mesh::BodySurface, motion::FrameBody};
 
-/// The one quality written so far, and its folder.
-const REPRESENTATION: &str = "high";
-/// The file of the pitch.
-const STATIC_SCENE: &str = "static.glb";
+/// JPEG quality of the plain profile.
+const JPEG_QUALITY: u8 = 85;
 /// How long a chunk is at least, except the last one.
 const CHUNK_NANOSECONDS: u64 = 1_000_000_000;
 
 /// Writes a stream folder. Frames are pushed in order of time; only [`StreamWriter::finish`] makes it a stream.
 #[derive(Debug)]
 pub struct StreamWriter {
-    folder: PathBuf,
+    folder: StreamFolder,
+    profile: Profile,
     header: StreamHeader,
     people: BTreeSet<PersonId>,
-    static_scene: FileEntry,
-    chunks: Vec<ChunkEntry>,
-    pending: Chunk,
+    pending: Vec<StreamFrame>,
     end: Ticks,
-    triangles: usize,
 }
 
 impl StreamWriter {
     /// Prepares `folder`, which may hold an older stream: its manifest goes first, so that no reader ever sees a manifest
-    /// with other chunks than its own.
+    /// with other chunks than its own. The compact profile has the whole ladder, the plain one its best quality.
     ///
     /// # Errors
     /// When the folder cannot be written.
-    pub fn create(folder: &Path, header: &StreamHeader) -> Result<Self, EncodeError> {
-        let chunks = folder.join(REPRESENTATION);
-        files::create_folder(&chunks)?;
-        files::remove(&folder.join(manifest::FILE_NAME))?;
-        remove_old_chunks(&chunks)?;
-        let bytes = static_scene::glb(&header.pitch)?;
-        files::write(&folder.join(STATIC_SCENE), &bytes)?;
+    pub fn create(folder: &Path, header: &StreamHeader, profile: Profile) -> Result<Self, EncodeError> {
+        let pitch = static_scene::glb(&header.pitch)?;
         Ok(Self {
-            folder: folder.to_owned(),
+            folder: StreamFolder::create(folder, header.timescale, profile, Some(&pitch))?,
+            profile,
             header: header.clone(),
             people: header.people.iter().map(|person| person.id).collect(),
-            static_scene: hash::entry(STATIC_SCENE, &bytes),
-            chunks: Vec::new(),
-            pending: Chunk::default(),
+            pending: Vec::new(),
             end: Ticks(0),
-            triangles: 0,
         })
     }
 
@@ -77,20 +67,19 @@ impl StreamWriter {
         }
         let second = self.header.timescale.ticks_in_nanoseconds(CHUNK_NANOSECONDS).max(Ticks(1));
         // Whoever jumps to a shot needs no frame of the one before.
-        let new_shot = |last: &ChunkFrame| {
+        let new_shot = |last: &StreamFrame| {
             self.header
                 .segments
                 .iter()
                 .any(|segment| segment.start > last.start && segment.start <= frame.start)
         };
-        if self.pending.frames.first().is_some_and(|first| frame.start >= first.start + second)
-            || self.pending.frames.last().is_some_and(new_shot)
+        if self.pending.first().is_some_and(|first| frame.start >= first.start + second)
+            || self.pending.last().is_some_and(new_shot)
         {
             self.flush()?;
         }
         self.end = frame.start + frame.duration;
-        let frame = self.pack(frame)?;
-        self.pending.frames.push(frame);
+        self.pending.push(without_empty(frame));
         Ok(())
     }
 
@@ -99,113 +88,116 @@ impl StreamWriter {
     /// # Errors
     /// When nothing was pushed or a file cannot be written.
     pub fn finish(mut self) -> Result<Manifest, EncodeError> {
-        if self.pending.frames.is_empty() {
+        if self.pending.is_empty() {
             return Err(EncodeError::NoFrames);
         }
         self.flush()?;
-        let manifest = Manifest {
-            format: manifest::FORMAT.to_owned(),
-            version: manifest::VERSION.to_owned(),
+        let mut segments = self.header.segments;
+        segments.retain(|segment| segment.start < self.end);
+        for Segment { start, duration, .. } in &mut segments {
+            *duration = (*duration).min(self.end - *start);
+        }
+        self.folder.finish(Manifest {
+            format: String::new(),
+            version: String::new(),
             timescale: self.header.timescale,
             duration: self.end,
             pitch: self.header.pitch,
-            static_scene: Some(self.static_scene),
+            live: None,
+            static_scene: None,
             people: self.header.people,
-            segments: self
-                .header
-                .segments
-                .into_iter()
-                .filter(|segment| segment.start < self.end)
-                .map(|segment| Segment {
-                    duration: segment.duration.min(self.end - segment.start),
-                    ..segment
-                })
-                .collect(),
-            representations: vec![Representation {
-                id: REPRESENTATION.to_owned(),
-                triangles_per_body: u32::try_from(self.triangles).unwrap_or(u32::MAX),
-                chunks: self.chunks,
-            }],
-        };
-        // What a reader would refuse is not worth writing.
-        manifest.validate(&Limits::default())?;
-        files::write(&self.folder.join(manifest::FILE_NAME), manifest.to_json()?.as_bytes())?;
-        Ok(manifest)
+            segments,
+            representations: Vec::new(),
+        })
     }
 
-    /// Textures to one atlas, surfaces to bodies that refer to it.
-    fn pack(&mut self, frame: StreamFrame) -> Result<ChunkFrame, EncodeError> {
-        let clip_frame = frame.clip_frame;
-        let (surfaces, empty): (Vec<BodySurface>, Vec<BodySurface>) = frame
-            .surfaces
-            .into_iter()
-            .partition(|surface| !surface.mesh.triangles.is_empty() && !surface.texture.as_raw().is_empty());
-        for surface in empty {
+    /// Writes the pending frames as a chunk of every representation.
+    fn flush(&mut self) -> Result<(), EncodeError> {
+        let frames = std::mem::take(&mut self.pending);
+        let content = match self.profile {
+            Profile::Compact => Content::Runs(sequence(&frames)),
+            Profile::Plain | Profile::Other => Content::Frames(plain(frames)?, Quantisation::default()),
+        };
+        self.folder.put(&content)
+    }
+}
+
+/// Leaves out surfaces that show nothing.
+fn without_empty(mut frame: StreamFrame) -> StreamFrame {
+    let clip_frame = frame.clip_frame;
+    frame.surfaces.retain(|surface| {
+        let shows = !surface.mesh.triangles.is_empty() && !surface.texture.as_raw().is_empty();
+        if !shows {
             tracing::warn!(
                 clip_frame,
                 person = surface.person.0,
                 "left out a body without triangles or texture"
             );
         }
-        let mut atlas = None;
-        let mut bodies = Vec::with_capacity(surfaces.len());
-        if !surfaces.is_empty() {
-            let crops: Vec<_> = surfaces.iter().map(|surface| &surface.texture).collect();
-            let packed = Atlas::pack(&crops, clip_frame);
-            let jpeg = packed
-                .jpeg()
-                .map_err(|error| EncodeError::Texture { clip_frame, message: error.to_string() })?;
-            for (index, surface) in surfaces.into_iter().enumerate() {
-                self.triangles = self.triangles.max(surface.mesh.triangles.len());
-                let uvs = surface.mesh.uvs.iter().map(|uv| packed.uv(index, *uv)).collect();
-                bodies.push(Body {
-                    person: surface.person,
-                    anchor_m: surface.anchor_m.as_vec3(),
-                    mesh: Mesh { uvs, ..surface.mesh },
-                    guessed_from_u: Some(packed.uv(index, [surface.guessed_from_u, 0.0])[0]),
-                });
-            }
-            atlas = Some(jpeg);
-        }
-        Ok(ChunkFrame {
-            clip_frame,
-            start: frame.start,
-            duration: frame.duration,
-            camera: frame.camera,
-            quality: frame.quality,
-            ball: frame.ball,
-            atlas,
-            bodies,
-        })
-    }
+        shows
+    });
+    frame
+}
 
-    /// Writes the pending frames as a chunk.
-    fn flush(&mut self) -> Result<(), EncodeError> {
-        let Some((start, end)) = self.pending.span() else { return Ok(()) };
-        let name = format!("{REPRESENTATION}/{:05}.glb", self.chunks.len());
-        let path = self.folder.join(&name);
-        let bytes = chunk::encode(&self.pending, self.header.timescale)
-            .map_err(|source| EncodeError::Chunk { path: path.clone(), source })?;
-        files::write(&path, &bytes)?;
-        self.chunks.push(ChunkEntry { file: hash::entry(name, &bytes), start, duration: end - start });
-        self.pending.frames.clear();
-        Ok(())
+/// Frames to runs of people.
+fn sequence(frames: &[StreamFrame]) -> Sequence {
+    let bodies = frames.iter().enumerate().flat_map(|(frame, content)| {
+        content.surfaces.iter().map(move |surface| {
+            let body = FrameBody {
+                frame,
+                anchor_m: surface.anchor_m,
+                mesh: &surface.mesh,
+                texture: &surface.texture,
+                guessed_from_u: Some(surface.guessed_from_u),
+            };
+            (surface.person, body)
+        })
+    });
+    Sequence { frames: frames.iter().map(bare).collect(), runs: runs(bodies) }
+}
+
+/// A frame without bodies.
+fn bare(frame: &StreamFrame) -> ChunkFrame {
+    ChunkFrame {
+        clip_frame: frame.clip_frame,
+        start: frame.start,
+        duration: frame.duration,
+        camera: frame.camera,
+        quality: frame.quality,
+        ball: frame.ball,
+        atlas: None,
+        bodies: Vec::new(),
     }
 }
 
-/// Removes `00000.glb` and so on: an older stream may have had more of them.
-fn remove_old_chunks(folder: &Path) -> Result<(), FileError> {
-    for entry in fs::read_dir(folder).map_err(FileError::new("read", folder))? {
-        let path = entry.map_err(FileError::new("read", folder))?.path();
-        let number = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        let is_chunk = path.extension().is_some_and(|extension| extension == "glb")
-            && number.len() >= 5
-            && number.bytes().all(|digit| digit.is_ascii_digit());
-        if is_chunk {
-            files::remove(&path)?;
-        }
+fn plain(frames: Vec<StreamFrame>) -> Result<Chunk, EncodeError> {
+    Ok(Chunk { frames: frames.into_iter().map(pack).collect::<Result<_, _>>()? })
+}
+
+/// Textures to one atlas, surfaces to bodies that refer to it.
+fn pack(frame: StreamFrame) -> Result<ChunkFrame, EncodeError> {
+    let clip_frame = frame.clip_frame;
+    let mut packed = bare(&frame);
+    if frame.surfaces.is_empty() {
+        return Ok(packed);
     }
-    Ok(())
+    let crops: Vec<_> = frame.surfaces.iter().map(|surface| &surface.texture).collect();
+    let atlas = Atlas::pack(&crops, clip_frame);
+    let jpeg = atlas
+        .jpeg(JPEG_QUALITY)
+        .map_err(|error| EncodeError::Texture { clip_frame, message: error.to_string() })?;
+    packed.atlas = Some(FrameAtlas::Encoded(jpeg));
+    let body = |(index, surface): (usize, BodySurface)| {
+        let uvs = surface.mesh.uvs.iter().map(|uv| atlas.uv(index, *uv)).collect();
+        Body {
+            person: surface.person,
+            anchor_m: surface.anchor_m.as_vec3(),
+            mesh: Mesh { uvs, ..surface.mesh },
+            guessed_from_u: Some(atlas.uv(index, [surface.guessed_from_u, 0.0])[0]),
+        }
+    };
+    packed.bodies = frame.surfaces.into_iter().enumerate().map(body).collect();
+    Ok(packed)
 }
 
 #[cfg(test)]

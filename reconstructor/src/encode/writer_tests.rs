@@ -1,5 +1,7 @@
 //! Folders written, overwritten, read back, and disks that refuse.
 
+use std::fs;
+
 use glam::Vec3;
 use image::{Rgb, RgbImage};
 use protocol::{
@@ -12,7 +14,7 @@ use protocol::{
 };
 
 use super::*;
-use crate::encode::{EncodeError, StreamError, StreamReader, read_stream};
+use crate::encode::{EncodeError, FileError, StreamError, StreamReader, read_stream};
 
 fn header(people: u32) -> StreamHeader {
     StreamHeader {
@@ -34,6 +36,18 @@ fn header(people: u32) -> StreamHeader {
     }
 }
 
+/// The picture of a frame's atlas.
+fn atlas_of(frame: &ChunkFrame) -> RgbImage {
+    match frame.atlas.as_ref().unwrap() {
+        FrameAtlas::Encoded(file) => image::load_from_memory(&file.bytes).unwrap().to_rgb8(),
+        FrameAtlas::Pixels(picture) => {
+            let pixels =
+                picture.rgba.as_chunks::<4>().0.iter().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]);
+            RgbImage::from_raw(picture.width_px, picture.height_px, pixels.collect()).unwrap()
+        }
+    }
+}
+
 #[test]
 fn a_shot_begins_a_chunk_and_segments_end_with_the_stream() {
     let folder = tempfile::tempdir().unwrap();
@@ -46,7 +60,8 @@ fn a_shot_begins_a_chunk_and_segments_end_with_the_stream() {
         segment(14, 90, SegmentKind::Shot),
         segment(90, 95, SegmentKind::Gap),
     ];
-    let mut writer = StreamWriter::create(folder.path(), &StreamHeader { segments, ..header(1) }).unwrap();
+    let mut writer =
+        StreamWriter::create(folder.path(), &StreamHeader { segments, ..header(1) }, Profile::Plain).unwrap();
     for index in (0..10).chain(14..20) {
         writer.push_frame(frame(index, 1)).unwrap();
     }
@@ -89,7 +104,7 @@ fn colour(person: PersonId) -> Rgb<u8> {
 }
 
 fn write(folder: &Path, frames: u32, people: u32) -> Manifest {
-    let mut writer = StreamWriter::create(folder, &header(people)).unwrap();
+    let mut writer = StreamWriter::create(folder, &header(people), Profile::Plain).unwrap();
     for index in 0..frames {
         writer.push_frame(frame(index, people)).unwrap();
     }
@@ -106,7 +121,7 @@ fn a_stream_comes_back_with_its_people_colours_and_times() {
     assert_eq!(manifest.duration, Ticks(65 * 1001));
     for (index, frame) in chunks.iter().flat_map(|chunk| &chunk.frames).enumerate() {
         assert_eq!(frame.start, Ticks(index as i64 * 1001));
-        let atlas = image::load_from_memory(&frame.atlas.as_ref().unwrap().bytes).unwrap().to_rgb8();
+        let atlas = atlas_of(frame);
         for body in &frame.bodies {
             assert_eq!(body.anchor_m, sample::anchor_of(index as u32, body.person.0));
             let [u, v] = body.mesh.uvs[0];
@@ -124,7 +139,7 @@ fn a_stream_comes_back_with_its_people_colours_and_times() {
 fn an_older_longer_stream_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), 95, 1);
-    let mut writer = StreamWriter::create(folder.path(), &header(1)).unwrap();
+    let mut writer = StreamWriter::create(folder.path(), &header(1), Profile::Plain).unwrap();
     assert!(
         !folder.path().join(FILE_NAME).exists(),
         "the old manifest would name chunks that are going away"
@@ -142,7 +157,7 @@ fn an_older_longer_stream_leaves_nothing_behind() {
 #[test]
 fn a_body_without_triangles_is_left_out() {
     let folder = tempfile::tempdir().unwrap();
-    let mut writer = StreamWriter::create(folder.path(), &header(2)).unwrap();
+    let mut writer = StreamWriter::create(folder.path(), &header(2), Profile::Plain).unwrap();
     let mut first = frame(0, 2);
     first.surfaces[0].mesh.triangles.clear();
     writer.push_frame(first).unwrap();
@@ -155,14 +170,14 @@ fn a_body_without_triangles_is_left_out() {
 #[test]
 fn wrong_order_strangers_and_nothing_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let mut writer = StreamWriter::create(folder.path(), &header(1)).unwrap();
+    let mut writer = StreamWriter::create(folder.path(), &header(1), Profile::Plain).unwrap();
     writer.push_frame(frame(1, 1)).unwrap();
     assert!(matches!(writer.push_frame(frame(0, 1)), Err(EncodeError::Order { clip_frame: 150 })));
     assert!(matches!(
         writer.push_frame(frame(2, 2)),
         Err(EncodeError::UnknownPerson { person: PersonId(1), .. })
     ));
-    let empty = StreamWriter::create(folder.path(), &header(1)).unwrap();
+    let empty = StreamWriter::create(folder.path(), &header(1), Profile::Plain).unwrap();
     assert!(matches!(empty.finish(), Err(EncodeError::NoFrames)));
 }
 
@@ -171,7 +186,7 @@ fn a_full_disk_names_the_file_and_leaves_no_manifest() {
     // /dev/full is a disk that is always full; the chunks' folder is a link to it in spirit: a file where a folder
     // should be is the nearest thing that needs no privileges.
     let folder = tempfile::tempdir().unwrap();
-    let mut writer = StreamWriter::create(folder.path(), &header(1)).unwrap();
+    let mut writer = StreamWriter::create(folder.path(), &header(1), Profile::Plain).unwrap();
     fs::remove_dir_all(folder.path().join("high")).unwrap();
     fs::write(folder.path().join("high"), b"in the way").unwrap();
     writer.push_frame(frame(0, 1)).unwrap();

@@ -12,10 +12,8 @@ use protocol::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{
-    matches::pairs,
-    surface::{Surface, body_triangles},
-};
+use super::matches::pairs;
+use crate::surface::{Surface, body_triangles};
 
 /// Points followed on a body.
 const POINTS: usize = 150;
@@ -92,8 +90,8 @@ impl Followed {
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let near = surface
                 .nearest(point)
-                .filter(|(near, facing)| near.distance(point) <= REACH_M && facing.dot(normal) >= FACING);
-            (point, near.map(|(near, _)| point + normal * (near - point).dot(normal)))
+                .filter(|near| near.point.distance(point) <= REACH_M && near.normal.dot(normal) >= FACING);
+            (point, near.map(|near| point + normal * (near.point - point).dot(normal)))
         });
         Some(Self {
             frame: frame.clip_frame,

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 use protocol::chunk::{Body, ChunkFrame};
 use serde::{Deserialize, Serialize};
 
-use super::surface::{Surface, body_triangles, spread};
+use crate::surface::{Surface, body_triangles, spread};
 use crate::{
     assignment::{Pair, most_gain},
     report::{median, quantile},

@@ -3,6 +3,7 @@
 
 pub mod air;
 pub mod ball;
+mod baseline;
 pub mod calibration;
 pub mod depth;
 pub mod detection;
@@ -16,5 +17,6 @@ pub mod planes;
 pub mod realism;
 pub mod segmentation;
 pub mod simulated;
-mod surface;
+pub mod stream;
+pub mod stream_plot;
 pub mod tracking;

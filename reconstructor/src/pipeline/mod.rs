@@ -21,6 +21,8 @@ use std::path::PathBuf;
 pub use error::PipelineError;
 pub use observe::{Observation, ObserveOptions, Seen, observe};
 
+use protocol::manifest::Profile;
+
 use crate::{
     mesh::MeshBudget,
     report::{ReconstructReport, Reporter},
@@ -34,6 +36,8 @@ pub struct ReconstructOptions {
     pub observe: ObserveOptions,
     /// Folder of the stream; an older stream in it is replaced.
     pub out: PathBuf,
+    /// How its chunks are made.
+    pub profile: Profile,
     /// Triangles per body.
     pub budget: MeshBudget,
     /// Of the paths.
@@ -66,6 +70,7 @@ pub fn reconstruct(
     let skins = run.skins(&cameras, &people, &masks, &depths)?;
     let paths = run.smooth(&people, &tracks, options.smoothing);
     let figures = run.write(&write::Scene {
+        profile: options.profile,
         out: &options.out,
         budget: options.budget,
         detections: &detections,

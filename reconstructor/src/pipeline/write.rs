@@ -8,7 +8,7 @@ use std::{
 
 use protocol::{
     chunk::FrameQuality,
-    manifest::{Person as StreamPerson, PersonId, Segment, SegmentKind},
+    manifest::{Person as StreamPerson, PersonId, Profile, Segment, SegmentKind},
 };
 
 use super::{
@@ -41,6 +41,7 @@ const STEADY_FRAMES: usize = 2;
 /// All that the last stages need.
 pub(super) struct Scene<'a> {
     pub(super) out: &'a std::path::Path,
+    pub(super) profile: Profile,
     pub(super) budget: MeshBudget,
     pub(super) detections: &'a [Vec<Detection>],
     pub(super) cameras: &'a [CameraEstimate],
@@ -62,7 +63,7 @@ impl Run<'_> {
         let wanted: Vec<bool> = scene.cameras.iter().map(|estimate| estimate.camera.is_some()).collect();
         let progress = self.reporter.progress(Stage::Mesh, wanted.iter().filter(|wanted| **wanted).count());
         let mut writing = Writing {
-            writer: StreamWriter::create(scene.out, &self.header(scene))?,
+            writer: StreamWriter::create(scene.out, &self.header(scene), scene.profile)?,
             figures: self.figures(scene),
             failures: Vec::new(),
             encode: Duration::ZERO,

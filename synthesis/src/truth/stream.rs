@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use protocol::{
-    chunk::{self, Ball, Body, Chunk, ChunkFrame, EncodedImage, FrameQuality, ImageFormat},
+    chunk::{self, Atlas, Ball, Body, Chunk, ChunkFrame, EncodedImage, FrameQuality, ImageFormat},
     hash,
-    manifest::{ChunkEntry, FILE_NAME, FORMAT, Manifest, Person, PersonId, Representation, VERSION},
+    manifest::{ChunkEntry, FILE_NAME, FORMAT, Manifest, Person, PersonId, Profile, Representation, VERSION},
     mesh::Mesh,
     time::{Ticks, Timescale},
 };
@@ -147,7 +147,7 @@ pub fn stream_frame(
         camera: Some(truth.camera),
         quality: FrameQuality { line_residual_px: Some(0.0), track_confidence: Some(1.0) },
         ball: Some(Ball { position_m: DVec3::from(truth.ball.position_m), height_known: true, spread: None }),
-        atlas: Some(palette.clone()),
+        atlas: Some(Atlas::Encoded(palette.clone())),
         bodies,
     }
 }
@@ -227,11 +227,13 @@ impl StreamWriter {
             timescale: self.timescale,
             duration: self.end,
             pitch: fixture.stadium.pitch,
+            live: None,
             static_scene: None,
             people,
             segments: Vec::new(),
             representations: vec![Representation {
                 id: NAME.into(),
+                profile: Profile::Plain,
                 triangles_per_body: triangles,
                 chunks: self.chunks,
             }],
