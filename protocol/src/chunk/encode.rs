@@ -3,14 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    Atlas, Body, Chunk, ChunkError, ChunkFrame, EncodedImage, draco, guessed_is_possible,
+    Atlas, Body, Chunk, ChunkError, ChunkFrame, EncodedImage, draco,
+    geometry::{bounds, draco_mesh},
+    guessed_is_possible,
     index::{ChunkIndex, FrameIndex, LAYOUT, PersonTrack, SceneExtras},
 };
 use crate::{
     gltf::{
-        Accessor, Animation, AnimationSampler, Attributes, Builder, Channel, DRACO, DracoExtension, Image,
-        Interpolation, Material, Mesh, Node, Primitive, PrimitiveExtensions, Sampler, Scene, Target,
-        TargetPath, Texture, UNLIT, component,
+        Accessor, Animation, AnimationSampler, Builder, Channel, DRACO, Image, Interpolation, Material, Node,
+        Sampler, Scene, Target, TargetPath, Texture, UNLIT, component,
     },
     manifest::PersonId,
     time::{Ticks, Timescale},
@@ -338,46 +339,6 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Adds a mesh whose geometry is the Draco data `bytes`, which decodes to `stored`; its accessors say what a reader will really find there.
-pub(crate) fn draco_mesh(
-    builder: &mut Builder,
-    bytes: &[u8],
-    stored: &crate::mesh::Mesh,
-    material: usize,
-) -> usize {
-    let buffer_view = builder.view(bytes, None);
-    let vertices = stored.positions_m.len();
-    let accessor = |component_type, count, kind: &str| Accessor {
-        buffer_view: None,
-        byte_offset: 0,
-        component_type,
-        count,
-        kind: kind.to_owned(),
-        min: Vec::new(),
-        max: Vec::new(),
-    };
-    let (min, max) = bounds(&stored.positions_m);
-    let position = builder.accessor(Accessor { min, max, ..accessor(component::F32, vertices, "VEC3") });
-    let uv = builder.accessor(accessor(component::F32, vertices, "VEC2"));
-    // The largest 16-bit index is reserved.
-    let index_type = if vertices <= usize::from(u16::MAX) { component::U16 } else { component::U32 };
-    let indices = builder.accessor(accessor(index_type, stored.triangles.len() * 3, "SCALAR"));
-    let extension = DracoExtension {
-        buffer_view,
-        attributes: Attributes { position: draco::POSITION_ID, uv: Some(draco::UV_ID), normal: None },
-    };
-    builder.document.meshes.push(Mesh {
-        name: String::new(),
-        primitives: vec![Primitive {
-            attributes: Attributes { position, uv: Some(uv), normal: None },
-            indices: Some(indices),
-            material: Some(material),
-            extensions: Some(PrimitiveExtensions { draco: Some(extension) }),
-        }],
-    });
-    builder.document.meshes.len() - 1
-}
-
 /// The file of an atlas; frames with another kind are refused before.
 fn file_of(atlas: &Atlas) -> Option<&EncodedImage> {
     match atlas {
@@ -405,16 +366,4 @@ fn key_times(frames: &[ChunkFrame], timescale: Timescale) -> Vec<f32> {
         });
     }
     times
-}
-
-/// Smallest and largest value of each component.
-fn bounds<const N: usize>(values: &[[f32; N]]) -> (Vec<f32>, Vec<f32>) {
-    let (mut min, mut max) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
-    for value in values {
-        for axis in 0..N {
-            min[axis] = min[axis].min(value[axis]);
-            max[axis] = max[axis].max(value[axis]);
-        }
-    }
-    (min.to_vec(), max.to_vec())
 }

@@ -6,6 +6,7 @@ mod decode;
 pub(crate) mod draco;
 mod encode;
 mod error;
+mod geometry;
 mod index;
 mod picture;
 
@@ -20,7 +21,8 @@ pub use self::{
 
 pub(crate) use self::{
     decode::{BodyError, Budget, body_mesh, check_times, reference},
-    encode::{check_frames, draco_mesh},
+    encode::check_frames,
+    geometry::draco_mesh,
 };
 
 use glam::{DVec3, Vec3};

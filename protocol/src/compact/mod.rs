@@ -10,6 +10,7 @@ mod encode;
 mod entropy;
 mod klt;
 mod motion;
+mod run;
 mod texture;
 mod wire;
 
