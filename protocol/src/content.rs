@@ -4,7 +4,8 @@ use std::borrow::Cow;
 
 use crate::{
     chunk::{self, Chunk, ChunkError, ChunkFrame},
-    compact::CompactChunk,
+    compact::{CompactChunk, EXTENSION},
+    glb::Glb,
     limits::Limits,
     playback::Content,
     time::Ticks,
@@ -25,7 +26,10 @@ impl AnyChunk {
     /// # Errors
     /// When the file is neither, is corrupt, or exceeds `limits`.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, ChunkError> {
-        if CompactChunk::is_one(bytes, limits) {
+        ChunkError::check("bytes", bytes.len(), limits.chunk_bytes)?;
+        // The name stands in the document of every compact chunk; to look for it costs less than to read a plain one's document twice.
+        let document = Glb::parse(bytes)?.json;
+        if document.windows(EXTENSION.len()).any(|piece| piece == EXTENSION.as_bytes()) {
             return CompactChunk::decode(bytes, limits).map(Self::Compact);
         }
         chunk::decode(bytes, limits).map(Self::Plain)

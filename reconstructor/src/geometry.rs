@@ -1,7 +1,29 @@
 //! Values in image space that several stages share. Pixels of the clip: origin at the centre of the top-left pixel.
 
 use glam::DVec2;
+use image::RgbImage;
 use serde::{Deserialize, Serialize};
+
+/// The colour of a picture between its pixels, 0..255; its edges go on for ever, an empty one is black.
+#[must_use]
+pub fn bilinear(picture: &RgbImage, at: DVec2) -> [f32; 3] {
+    let (last_x, last_y) =
+        (i64::from(picture.width().saturating_sub(1)), i64::from(picture.height().saturating_sub(1)));
+    let low = at.floor();
+    let (fx, fy) = ((at.x - low.x) as f32, (at.y - low.y) as f32);
+    let pixel = |x: i64, y: i64| {
+        let pixel = picture.get_pixel_checked(x.clamp(0, last_x) as u32, y.clamp(0, last_y) as u32);
+        pixel.map_or([0.0; 3], |pixel| pixel.0.map(f32::from))
+    };
+    let (x, y) = (low.x as i64, low.y as i64);
+    let [right, below] = [x.saturating_add(1), y.saturating_add(1)];
+    let (a, b, c, d) = (pixel(x, y), pixel(right, y), pixel(x, below), pixel(right, below));
+    std::array::from_fn(|k| {
+        let top = a[k] + (b[k] - a[k]) * fx;
+        let bottom = c[k] + (d[k] - c[k]) * fx;
+        top + (bottom - top) * fy
+    })
+}
 
 /// An axis-aligned box in pixels of the clip; may reach outside the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -126,6 +126,8 @@ fn run_reconstruct(arguments: cli::Reconstruct) -> Result<()> {
         smoothing: Smoothing::default(),
         overlay: arguments.overlay,
     };
+    // People of a chunk are followed at the same time: on no more cores than were asked for.
+    rayon::ThreadPoolBuilder::new().num_threads(options.observe.threads).build_global()?;
     let mut reporter = Reporter::new();
     let report = reconstruct(&options, &mut reporter).inspect_err(|_| {
         if let Some(work) = options.observe.work.as_ref().filter(|work| work.exists()) {

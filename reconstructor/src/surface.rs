@@ -100,6 +100,20 @@ pub(crate) fn nearest_on_triangle(p: DVec3, [a, b, c]: Triangle) -> DVec3 {
     a + ab * (vb * scale) + ac * (vc * scale)
 }
 
+/// Weights of the corners at a point of a triangle.
+pub(crate) fn barycentric(point: DVec3, [a, b, c]: Triangle) -> [f64; 3] {
+    let (ab, ac, ap) = (b - a, c - a, point - a);
+    let (d00, d01, d11) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
+    let (d20, d21) = (ap.dot(ab), ap.dot(ac));
+    let scale = d00 * d11 - d01 * d01;
+    if scale.abs() < 1e-18 {
+        return [1.0, 0.0, 0.0];
+    }
+    let v = (d11 * d20 - d01 * d21) / scale;
+    let w = (d00 * d21 - d01 * d20) / scale;
+    [1.0 - v - w, v, w]
+}
+
 /// A surface that answers how far a point is from it.
 #[derive(Clone, Debug)]
 pub(crate) struct Surface {

@@ -42,11 +42,12 @@ fn stream() -> Result<()> {
     cargo(&["build", "--workspace", "--all-targets"])?;
     let kept = ["--work", "target/demo/work", "--profile", "plain"];
     demo::reconstruct("target/demo/plain", &kept)?;
-    let json = "target/demo/stream.json";
-    built("reconstructor", &["evaluate", "stream", "--stream", "target/demo/plain", "--json", json])?;
+    let (json, plot) = ("target/demo/stream.json", "target/demo/stream.svg");
+    let figures = ["--stream", "target/demo/plain", "--json", json, "--plot", plot];
+    built("reconstructor", &[&["evaluate", "stream"], figures.as_slice()].concat())?;
     built("examples/watch_made_up_match", &[])?;
     built("examples/soak", &["--seconds", "120"])?;
     built("examples/mutate", &["1000000"])?;
-    println!("figures: {json}");
+    println!("figures: {json}, {plot}");
     Ok(())
 }

@@ -73,7 +73,7 @@ pub(crate) fn check_frames(frames: &[ChunkFrame]) -> Result<(), ChunkError> {
         if !content.bodies.iter().all(|body| seen.insert(body.person)) {
             return Err(problem("a person has two bodies"));
         }
-        if !finite(content) {
+        if !is_finite(content) {
             return Err(problem(
                 "the camera, the ball, an anchor or a figure is not a number, or the ball is nowhere near",
             ));
@@ -91,7 +91,8 @@ pub(crate) fn check_frames(frames: &[ChunkFrame]) -> Result<(), ChunkError> {
     Ok(())
 }
 
-fn finite(frame: &ChunkFrame) -> bool {
+/// Whether a frame has only numbers, and its ball is near.
+pub(crate) fn is_finite(frame: &ChunkFrame) -> bool {
     let camera = frame.camera.is_none_or(|camera| {
         camera.rotation.is_finite()
             && camera.position.is_finite()

@@ -21,7 +21,7 @@ pub use self::{
 
 pub(crate) use self::{
     decode::{BodyError, Budget, body_mesh, check_times, reference},
-    encode::check_frames,
+    encode::{check_frames, is_finite},
     geometry::draco_mesh,
 };
 

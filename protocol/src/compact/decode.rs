@@ -13,13 +13,13 @@ use super::{
     motion::{self, Points},
     run::DecodedRun,
     texture::{self, Blocks, TILE_PX, TILE_VALUES},
-    wire::{ANCHOR_STEP_M, Head, Motion, RunHead},
+    wire::{ANCHOR_STEP_M, FARTHEST_M, Head, Motion, RunHead},
 };
 use crate::{
     atlas::{self, Layout},
     chunk::{
         Atlas, BodyError, Budget, ChunkError, ChunkFrame, PixelImage, body_mesh, check_times,
-        guessed_is_possible, reference,
+        guessed_is_possible, is_finite, reference,
     },
     glb::Glb,
     gltf::{Accessor, BufferView, Mesh as GltfMesh},
@@ -29,8 +29,9 @@ use crate::{
 
 /// Layout version written and read by this crate.
 pub(super) const LAYOUT: u32 = 1;
-/// Anchors farther away than this are nowhere near a pitch, metres.
-const FARTHEST_M: f32 = 10_000.0;
+/// Bytes of a head at most: that of the longest chunk with the most bodies that a reader takes has a third. Its lists take up to thirty times as
+/// much memory.
+const HEAD_BYTES: usize = 1 << 20;
 /// Steps of points and of textures at most.
 const LARGEST_STEP_M: f32 = 1.0;
 const LARGEST_TEXTURE_STEP: f32 = 255.0;
@@ -83,12 +84,6 @@ pub struct CompactChunk {
 }
 
 impl CompactChunk {
-    /// Whether a GLB file says that it is a compact chunk. Does not say whether it is a good one.
-    #[must_use]
-    pub fn is_one(bytes: &[u8], limits: &Limits) -> bool {
-        open(bytes, limits).is_ok()
-    }
-
     /// Reads a compact chunk.
     ///
     /// # Errors
@@ -102,9 +97,9 @@ impl CompactChunk {
         if head.timescale.numerator == 0 || head.timescale.denominator == 0 {
             return Err(ChunkError::Corrupt { what: "timescale" });
         }
-        if let Some(frame) = frames.iter().position(|frame| !frame.ball.is_none_or(|ball| ball.is_possible()))
-        {
-            return Err(ChunkError::Frame { frame, problem: "the ball is nowhere near the pitch" });
+        if let Some(frame) = frames.iter().position(|frame| !is_finite(frame)) {
+            let problem = "the camera or a figure is not a number, or the ball is nowhere near the pitch";
+            return Err(ChunkError::Frame { frame, problem });
         }
         let mut budget = Budget::new(limits.decoded_bytes_per_chunk);
         let (mut seen, mut counts) = (BTreeSet::new(), vec![0usize; frames.len()]);
@@ -223,8 +218,9 @@ impl<'a> File<'a> {
     }
 
     fn head(&self, limits: &Limits) -> Result<Head, ChunkError> {
-        let head: Head = postcard::from_bytes(self.view(self.extension.head)?)
-            .map_err(|_| ChunkError::Corrupt { what: "head" })?;
+        let bytes = self.view(self.extension.head)?;
+        ChunkError::check("bytes of the head", bytes.len(), HEAD_BYTES)?;
+        let head: Head = postcard::from_bytes(bytes).map_err(|_| ChunkError::Corrupt { what: "head" })?;
         ChunkError::check("frames", head.frames.len(), limits.frames_per_chunk)?;
         if head.frames.is_empty() {
             return Err(ChunkError::Empty);
@@ -284,6 +280,8 @@ impl<'a> File<'a> {
         let side = limits.texture_side_px as usize;
         ChunkError::check("pixels along a texture", width.max(height), side)?;
         let (columns, rows) = (width.div_ceil(TILE_PX), height.div_ceil(TILE_PX));
+        // The atlas will hold it, and the list of tiles is no larger.
+        budget.spend(columns * rows * TILE_PX * TILE_PX * 4)?;
         let tiles =
             stored_tiles(wire.tiles, columns * rows).ok_or(ChunkError::Corrupt { what: "list of tiles" })?;
         let values = |waves: usize, each: usize| waves.saturating_mul(each).saturating_mul(4);

@@ -8,7 +8,7 @@ use super::{
     klt::Basis,
     motion::{self, Points},
     texture::{self, Blocks, TILE_PX, TILE_VALUES},
-    wire::{ANCHOR_STEP_M, Head, Motion, RunHead},
+    wire::{ANCHOR_STEP_M, FARTHEST_M, Head, Motion, RunHead},
 };
 use crate::{
     chunk::{ChunkError, PixelImage, Quantisation, check_frames, draco, draco_mesh},
@@ -130,7 +130,10 @@ fn check_runs(sequence: &Sequence) -> Result<(), ChunkError> {
         let finite =
             |positions: &Vec<[f32; 3]>| positions.as_flattened().iter().all(|value| value.is_finite());
         if run.positions_m.iter().any(|positions| positions.len() != vertices || !finite(positions))
-            || !run.anchors_m.iter().all(|anchor| anchor.is_finite() && anchor.abs().max_element() < 1e5)
+            || !run
+                .anchors_m
+                .iter()
+                .all(|anchor| anchor.is_finite() && anchor.abs().max_element() < FARTHEST_M)
         {
             return Err(problem("a position is missing or not a number, or an anchor is nowhere near"));
         }
@@ -210,41 +213,20 @@ impl Packed {
     }
 }
 
-/// The vertex of the mesh that each vertex of its rounded copy is: the codec reorders them.
+/// The vertex of the mesh that each vertex of its rounded copy is: the codec reorders them. The nearest one, a body being about as large as its
+/// texture is wide.
 fn originals(mesh: &Mesh, rounded: &Mesh) -> Vec<usize> {
-    let place = |mesh: &Mesh, vertex: usize| {
-        let [x, y, z] = mesh.positions_m.get(vertex).copied().unwrap_or_default();
-        let [u, v] = mesh.uvs.get(vertex).copied().unwrap_or_default();
-        // A body is about as large as its texture is wide.
-        [x, y, z, u, v]
+    let places = |mesh: &Mesh| -> Vec<[f32; 5]> {
+        let both = mesh.positions_m.iter().zip(&mesh.uvs);
+        both.map(|([x, y, z], [u, v])| [*x, *y, *z, *u, *v]).collect()
     };
-    // Sorted by height, so that only vertices about as high are compared.
-    let mut by_height: Vec<(f32, usize)> =
-        mesh.positions_m.iter().enumerate().map(|(vertex, position)| (position[1], vertex)).collect();
-    by_height.sort_by(|a, b| a.0.total_cmp(&b.0));
-    (0..rounded.positions_m.len())
-        .map(|vertex| {
-            let here = place(rounded, vertex);
-            let middle = by_height.partition_point(|(height, _)| *height < here[1]);
-            let (mut best, mut found) = (f32::INFINITY, 0);
-            let (below, above) = by_height.split_at(middle);
-            let mut look = |candidates: &mut dyn Iterator<Item = &(f32, usize)>| {
-                for (height, candidate) in candidates {
-                    if (height - here[1]).powi(2) >= best {
-                        break;
-                    }
-                    let there = place(mesh, *candidate);
-                    let distance = (0..5).map(|axis| (here[axis] - there[axis]).powi(2)).sum::<f32>();
-                    if distance < best {
-                        (best, found) = (distance, *candidate);
-                    }
-                }
-            };
-            look(&mut below.iter().rev());
-            look(&mut above.iter());
-            found
-        })
-        .collect()
+    let given = places(mesh);
+    let nearest = |here: &[f32; 5]| {
+        let apart = |there: &[f32; 5]| (0..5).map(|axis| (here[axis] - there[axis]).powi(2)).sum::<f32>();
+        let distances = given.iter().map(apart).enumerate();
+        distances.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(vertex, _)| vertex)
+    };
+    places(rounded).iter().map(nearest).collect()
 }
 
 /// Records the points' shares; returns the values of their waves.

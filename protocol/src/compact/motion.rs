@@ -1,7 +1,5 @@
 //! How the points of a mesh move: the share that each point takes of each wave, predicted from the points beside it.
 
-use std::collections::BTreeMap;
-
 use super::entropy::{Reader, Recorder};
 use crate::{chunk::ChunkError, mesh::Mesh};
 
@@ -27,16 +25,8 @@ pub(super) struct Points {
 impl Points {
     /// The points of a mesh whose triangles name vertices that it has.
     pub(super) fn of(mesh: &Mesh) -> Self {
-        let mut known: BTreeMap<[u32; 3], u32> = BTreeMap::new();
-        let mut points = Self::default();
-        for (vertex, position) in mesh.positions_m.iter().enumerate() {
-            let next = points.first_vertex.len() as u32;
-            let point = *known.entry(position.map(f32::to_bits)).or_insert(next);
-            if point == next {
-                points.first_vertex.push(vertex as u32);
-            }
-            points.of_vertex.push(point);
-        }
+        let (of_vertex, first_vertex) = mesh.points();
+        let mut points = Self { of_vertex, first_vertex, ..Self::default() };
         let mut edges: Vec<(u32, u32)> = Vec::with_capacity(mesh.triangles.len() * 3);
         for corners in &mesh.triangles {
             let [a, b, c] = corners.map(|vertex| points.of_vertex.get(vertex as usize).copied().unwrap_or(0));

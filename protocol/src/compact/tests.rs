@@ -31,13 +31,13 @@ fn encoded(sequence: &Sequence) -> Vec<u8> {
     encode(sequence, sample::TIMESCALE, &Quality::HIGH).unwrap()
 }
 
-/// The vertices of a body by place, in an order that does not depend on the file's.
-fn sorted(body: &Body) -> Vec<[i32; 3]> {
-    let mut places: Vec<[i32; 3]> =
-        body.mesh.positions_m.iter().map(|p| p.map(|value| (value * 50.0).round() as i32)).collect();
-    places.sort_unstable();
-    places.dedup();
-    places
+/// How far the farthest vertex of a body is from the nearest of another, metres; vertices have no order.
+fn farthest(body: &Body, given: &Body) -> f32 {
+    let nearest = |position: &[f32; 3]| {
+        let apart = |other: &[f32; 3]| (Vec3::from(*other) - Vec3::from(*position)).length();
+        given.mesh.positions_m.iter().map(apart).fold(f32::INFINITY, f32::min)
+    };
+    body.mesh.positions_m.iter().map(nearest).fold(0.0, f32::max)
 }
 
 #[test]
@@ -53,12 +53,8 @@ fn a_sample_sequence_comes_back() {
             assert_eq!(body.person, given.person);
             assert!((body.anchor_m - given.anchor_m).abs().max_element() < 0.001);
             assert_eq!(body.mesh.triangles.len(), given.mesh.triangles.len());
-            // Vertices are at the same places but for a centimetre, in whatever order.
-            for position in &body.mesh.positions_m {
-                let apart = |other: &[f32; 3]| (Vec3::from(*other) - Vec3::from(*position)).length();
-                let nearest = given.mesh.positions_m.iter().map(apart).fold(f32::INFINITY, f32::min);
-                assert!(nearest < 0.012, "a vertex is {nearest} m from where it was");
-            }
+            let off_m = farthest(body, given);
+            assert!(off_m < 0.012, "a vertex is {off_m} m from where it was");
             // The sample's people are skin above and shirt in the middle: the atlas has both.
             let colours = body.mesh.uvs.iter().map(|[u, v]| {
                 let x = ((u * atlas.width_px as f32) as u32).min(atlas.width_px - 1);
@@ -121,13 +117,13 @@ fn who_only_runs_along_costs_a_mesh_and_little_more() {
 fn a_finer_step_is_nearer_and_larger() {
     let sequence = sample::sequence_of(0, 20, 3);
     let coarse = Quality { point_step_m: 0.1, texture_step: 60.0, ..Quality::HIGH };
-    let sizes = [Quality::HIGH, coarse].map(|quality| {
+    let given = &sample::frame_of(13, 3).bodies[1];
+    let [fine, coarse] = [Quality::HIGH, coarse].map(|quality| {
         let bytes = encode(&sequence, sample::TIMESCALE, &quality).unwrap();
         let chunk = CompactChunk::decode(&bytes, &LIMITS).unwrap();
-        let places = sorted(&chunk.frame(13).unwrap().bodies[1]);
-        (bytes.len(), places == sorted(&sample::frame_of(13, 3).bodies[1]))
+        (bytes.len(), farthest(&chunk.frame(13).unwrap().bodies[1], given))
     });
-    assert!(sizes[0].0 > sizes[1].0, "{sizes:?}");
+    assert!(fine.0 > coarse.0 && 2.0 * fine.1 < coarse.1, "{fine:?} and {coarse:?}");
 }
 
 #[test]
@@ -179,6 +175,51 @@ fn a_chunk_beyond_the_limits_is_refused_before_it_is_decoded() {
     assert!(refused(Limits { vertices_per_body: 40, ..LIMITS }));
     assert!(refused(Limits { texture_side_px: 10, ..LIMITS }));
     assert!(refused(Limits { decoded_bytes_per_chunk: 20_000, ..LIMITS }));
+}
+
+/// A chunk without people whose head is `head`.
+fn with_head(head: &[u8]) -> Vec<u8> {
+    let json = format!(
+        "{{\"bufferViews\":[{{\"buffer\":0,\"byteLength\":{}}}],\"extensions\":{{\"{EXTENSION}\":{{\"layout\":1,\"head\":0,\"runs\":[]}}}}}}",
+        head.len()
+    );
+    Glb { json: json.as_bytes(), bin: head }.write().unwrap()
+}
+
+#[test]
+fn a_head_of_many_empty_lists_is_refused_before_they_are_made() {
+    // One tick per second, one short frame, no run, and tables without end: a byte each, twenty-four in memory.
+    let mut head = vec![1, 1, 1, 0, 0, 2, 0, 0, 0, 0, 0];
+    let good = CompactChunk::decode(&with_head(&[head.as_slice(), &[0]].concat()), &LIMITS);
+    assert_eq!(good.map(|chunk| chunk.frames().len()), Ok(1));
+    head.extend([0xFF, 0xFF, 0xFF, 0x7F]);
+    head.resize(8 << 20, 0);
+    let limits = Limits { chunk_bytes: 16 << 20, ..LIMITS };
+    let refused = CompactChunk::decode(&with_head(&head), &limits);
+    assert!(matches!(refused, Err(ChunkError::Limit { what: "bytes of the head", .. })), "{refused:?}");
+}
+
+#[test]
+fn a_camera_that_is_no_number_is_refused() {
+    let mut sequence = sample::sequence_of(0, 2, 1);
+    let bytes = encoded(&sequence);
+    let camera = sequence.frames[1].camera.as_mut().unwrap();
+    let focal = camera.focal_px.to_le_bytes();
+    camera.focal_px = f64::NAN;
+    assert!(encode(&sequence, sample::TIMESCALE, &Quality::HIGH).is_err());
+    let mut hostile = bytes.clone();
+    let at = bytes.windows(8).position(|eight| eight == focal).unwrap();
+    hostile[at..at + 8].copy_from_slice(&f64::NAN.to_le_bytes());
+    assert!(matches!(CompactChunk::decode(&hostile, &LIMITS), Err(ChunkError::Frame { .. })));
+}
+
+#[test]
+fn a_newer_layout_is_told_as_one() {
+    let bytes = encoded(&sample::sequence_of(0, 2, 1));
+    let at = bytes.windows(10).position(|ten| ten == b"\"layout\":1").unwrap();
+    let mut newer = bytes.clone();
+    newer[at + 9] = b'7';
+    assert_eq!(AnyChunk::decode(&newer, &LIMITS), Err(ChunkError::Version { found: 7, known: 1 }));
 }
 
 /// Reads everything that a hostile chunk offers.

@@ -86,23 +86,18 @@ fn inverse(block: &[f32; BLOCK]) -> [f32; BLOCK] {
     out
 }
 
-/// What the blocks before tell of the next one; one for luma, one for chroma.
-#[derive(Clone, Copy, Default)]
-struct Before {
-    end: u32,
-}
-
 /// Writes or reads the blocks of one wave.
 pub(super) struct Blocks {
     wave: usize,
-    before: [Before; 2],
+    /// Where the last block of luma ended, and of chroma.
+    ends: [u32; 2],
     /// The mean of the last block of luma and of each chroma.
     means: [i32; 3],
 }
 
 impl Blocks {
     pub(super) fn of_wave(wave: usize) -> Self {
-        Self { wave, before: [Before::default(); 2], means: [0; 3] }
+        Self { wave, ends: [0; 2], means: [0; 3] }
     }
 
     /// Luma or chroma of a tile's block, and the channel.
@@ -116,7 +111,7 @@ impl Blocks {
             1..=2 => 1,
             _ => 2,
         };
-        let before = match self.before[usize::from(plane)].end {
+        let before = match self.ends[usize::from(plane)] {
             0 => 0,
             1..=2 => 1,
             3..=8 => 2,
@@ -150,7 +145,7 @@ impl Blocks {
         }
         let end = ordered.iter().rposition(|value| *value != 0).map_or(0, |last| last + 1);
         recorder.push(self.end_context(plane), end as u32);
-        self.before[usize::from(plane)].end = end as u32;
+        self.ends[usize::from(plane)] = end as u32;
         let mut before = 0;
         for (place, value) in ordered.into_iter().enumerate().take(end) {
             recorder.push_signed(self.value_context(plane, place, before), value);
@@ -170,7 +165,7 @@ impl Blocks {
         let corrupt = ChunkError::Corrupt { what: "texture" };
         let (plane, channel) = Self::kind(block);
         let end = reader.number(self.end_context(plane))?;
-        self.before[usize::from(plane)].end = end;
+        self.ends[usize::from(plane)] = end;
         let end = usize::try_from(end).ok().filter(|end| *end <= BLOCK).ok_or(corrupt.clone())?;
         let mut steps = [0; BLOCK];
         let mut before = 0;

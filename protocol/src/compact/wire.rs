@@ -12,6 +12,9 @@ use crate::{
 /// Anchors are whole multiples of this, metres.
 pub(super) const ANCHOR_STEP_M: f32 = 1.0 / 1024.0;
 
+/// Anchors farther away than this along an axis are nowhere near a pitch, metres.
+pub(super) const FARTHEST_M: f32 = 10_000.0;
+
 /// Everything that is not of one run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Head {

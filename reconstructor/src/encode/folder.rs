@@ -57,9 +57,10 @@ impl StreamFolder {
         for rung in LADDER {
             remove_old_chunks(&folder.join(rung.id))?;
         }
-        let names: Vec<&str> = match profile {
-            Profile::Compact => LADDER.iter().map(|rung| rung.id).collect(),
-            Profile::Plain | Profile::Other => vec![PLAIN],
+        let (profile, names) = match profile {
+            Profile::Compact => (profile, LADDER.iter().map(|rung| rung.id).collect()),
+            // What readers do not know is not written.
+            Profile::Plain | Profile::Other => (Profile::Plain, vec![PLAIN]),
         };
         for name in &names {
             files::create_folder(&folder.join(name))?;
@@ -89,19 +90,17 @@ impl StreamFolder {
         };
         let (Some(first), Some(last)) = (frames.first(), frames.last()) else { return Ok(()) };
         let (start, duration) = (first.start, last.start + last.duration - first.start);
-        for representation in &mut self.representations {
+        let encoded = match content {
+            Content::Runs(sequence) => {
+                LADDER.iter().map(|rung| on_rung(rung, sequence, self.timescale)).collect()
+            }
+            Content::Frames(chunk, quantisation) => {
+                vec![(chunk::encode_with(chunk, self.timescale, *quantisation), most_triangles(chunk))]
+            }
+        };
+        for (representation, (bytes, triangles)) in self.representations.iter_mut().zip(encoded) {
             let name = format!("{}/{:05}.glb", representation.id, representation.chunks.len());
             let path = self.folder.join(&name);
-            let rung = LADDER.iter().find(|rung| rung.id == representation.id);
-            let (bytes, triangles) = match (content, rung) {
-                (Content::Runs(sequence), Some(rung)) => on_rung(rung, sequence, self.timescale),
-                (Content::Runs(sequence), None) => {
-                    (compact::encode(sequence, self.timescale, &compact::Quality::HIGH), 0)
-                }
-                (Content::Frames(chunk, quantisation), _) => {
-                    (chunk::encode_with(chunk, self.timescale, *quantisation), most_triangles(chunk))
-                }
-            };
             let bytes = bytes.map_err(|source| EncodeError::Chunk { path: path.clone(), source })?;
             files::write(&path, &bytes)?;
             let triangles = u32::try_from(triangles).unwrap_or(u32::MAX);

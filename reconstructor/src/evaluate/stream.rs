@@ -22,6 +22,7 @@ use serde::Serialize;
 use super::baseline::Baseline;
 use crate::{
     encode::{self, LADDER},
+    motion::sampled,
     surface::{MeshPlace, Surface, Triangle, spread, spread_places},
 };
 
@@ -75,7 +76,7 @@ pub struct RungFigures {
     pub head_share: f64,
     /// See `rest_share`.
     pub index_share: f64,
-    /// Processor time to decode a frame of 22 people, its share of the chunk included, milliseconds.
+    /// Time on one thread to decode a frame of 22 people, its share of the chunk included, milliseconds.
     pub decode_ms_p50: f64,
     /// See `decode_ms_p50`.
     pub decode_ms_p95: f64,
@@ -363,5 +364,5 @@ fn rgb(picture: &PixelImage) -> RgbImage {
 
 /// The colour at a texture coordinate, as a renderer reads it.
 fn colour(picture: &RgbImage, u: f64, v: f64) -> [f64; 3] {
-    crate::motion::sampled(picture, [u, v]).unwrap_or_default()
+    sampled(picture, [u, v]).map(f64::from)
 }

@@ -7,7 +7,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use super::topology::Topology;
-use crate::surface::{MeshPlace, Surface, Triangle};
+use crate::surface::{MeshPlace, Surface, Triangle, barycentric};
 
 /// Stiffness of the first and of the last step, and how many there are.
 const STIFF: f64 = 2.0;
@@ -90,20 +90,6 @@ fn goals(topology: &Topology, points: &[DVec3], target: &Target) -> Vec<(DVec3, 
         }
     }
     goals
-}
-
-/// Weights of the corners at a point of a triangle.
-pub(super) fn barycentric(point: DVec3, [a, b, c]: Triangle) -> [f64; 3] {
-    let (ab, ac, ap) = (b - a, c - a, point - a);
-    let (d00, d01, d11) = (ab.dot(ab), ab.dot(ac), ac.dot(ac));
-    let (d20, d21) = (ap.dot(ab), ap.dot(ac));
-    let scale = d00 * d11 - d01 * d01;
-    if scale.abs() < 1e-18 {
-        return [1.0, 0.0, 0.0];
-    }
-    let v = (d11 * d20 - d01 * d21) / scale;
-    let w = (d00 * d21 - d01 * d20) / scale;
-    [1.0 - v - w, v, w]
 }
 
 /// How the edges round a point have turned since rest, found from the turn before (Müller et al., "A Robust Method to Extract the

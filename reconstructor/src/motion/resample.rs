@@ -1,11 +1,13 @@
 //! The texture of one mesh in many frames: what each frame's own body shows at the place where the mesh's texel is.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use image::RgbImage;
 use protocol::{chunk::PixelImage, mesh::Mesh};
 
-use super::register::barycentric;
-use crate::surface::{Surface, Triangle};
+use crate::{
+    geometry::bilinear,
+    surface::{Surface, Triangle, barycentric, nearest_on_triangle},
+};
 
 /// Texels this far outside a triangle still take its colour: filtering reads them.
 const MARGIN_PX: f64 = 2.5;
@@ -89,7 +91,7 @@ impl Texels {
             for y in range(low.y, high.y, height) {
                 for x in range(low.x, high.x, width) {
                     let here = DVec3::new(f64::from(x), f64::from(y), 0.0);
-                    let near = crate::surface::nearest_on_triangle(here, triangle);
+                    let near = nearest_on_triangle(here, triangle);
                     let outside = here.distance(near);
                     let place = &mut best[(y * width + x) as usize];
                     if outside < place.0 {
@@ -155,20 +157,11 @@ fn colour_at(body: &Dressed<'_>, triangle: usize, weights: [f64; 3]) -> Option<[
         let [u, v] = *body.mesh.uvs.get(*corner as usize)?;
         uv = [uv[0] + weight * f64::from(u), uv[1] + weight * f64::from(v)];
     }
-    sampled(body.texture, uv).map(|colour| colour.map(|value| (value + 0.5) as u8))
+    Some(sampled(body.texture, uv).map(|value| (value + 0.5) as u8))
 }
 
-/// The colour of a picture at a texture coordinate, between its pixels; `None` of an empty one.
-pub(crate) fn sampled(picture: &RgbImage, uv: [f64; 2]) -> Option<[f64; 3]> {
-    let (width, height) = picture.dimensions();
-    let (x, y) = (uv[0] * f64::from(width) - 0.5, uv[1] * f64::from(height) - 0.5);
-    let (x0, y0) = (x.floor(), y.floor());
-    let mut sum = [0.0; 3];
-    for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-        let clamp = |value: f64, side: u32| value.clamp(0.0, f64::from(side.max(1) - 1)) as u32;
-        let weight = (1.0 - (x - x0 - dx).abs()) * (1.0 - (y - y0 - dy).abs());
-        let pixel = picture.get_pixel_checked(clamp(x0 + dx, width), clamp(y0 + dy, height))?;
-        sum = [0, 1, 2].map(|channel| sum[channel] + weight * f64::from(pixel.0[channel]));
-    }
-    Some(sum)
+/// The colour of a picture at a texture coordinate, 0..255.
+pub(crate) fn sampled(picture: &RgbImage, [u, v]: [f64; 2]) -> [f32; 3] {
+    let size = DVec2::new(f64::from(picture.width()), f64::from(picture.height()));
+    bilinear(picture, DVec2::new(u, v) * size - 0.5)
 }

@@ -1,7 +1,5 @@
 //! A mesh as one surface: vertices that lie on each other, as those along a seam of the texture do, are one point.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 use protocol::mesh::Mesh;
 
@@ -20,19 +18,15 @@ pub(super) struct Topology {
 
 impl Topology {
     /// The topology of a mesh and its points, in the order of their first vertex. `None` when a triangle names a vertex that is
-    /// not there.
+    /// not there, or a vertex has no texture coordinate.
     pub(super) fn of(mesh: &Mesh) -> Option<(Self, Vec<DVec3>)> {
-        let mut points: Vec<DVec3> = Vec::new();
-        let mut known: BTreeMap<[u32; 3], u32> = BTreeMap::new();
-        let mut point_of = Vec::with_capacity(mesh.positions_m.len());
-        for position in &mesh.positions_m {
-            // Zero has two signs.
-            let key = position.map(|value| (value + 0.0).to_bits());
-            point_of.push(*known.entry(key).or_insert_with(|| {
-                points.push(glam::Vec3::from(*position).as_dvec3());
-                points.len() as u32 - 1
-            }));
+        let (point_of, first_vertex) = mesh.points();
+        if mesh.uvs.len() != point_of.len() {
+            return None;
         }
+        let place = |vertex: &u32| mesh.positions_m.get(*vertex as usize);
+        let points: Vec<DVec3> =
+            first_vertex.iter().filter_map(place).map(|p| glam::Vec3::from(*p).as_dvec3()).collect();
         let corner = |vertex: u32| point_of.get(vertex as usize).copied();
         let corners = |[a, b, c]: &[u32; 3]| Some([corner(*a)?, corner(*b)?, corner(*c)?]);
         let triangles = mesh.triangles.iter().map(corners).collect::<Option<Vec<_>>>()?;

@@ -5,7 +5,10 @@
 use glam::DVec2;
 use image::RgbImage;
 
-use crate::pose::{Person, index};
+use crate::{
+    geometry::bilinear,
+    pose::{Person, index},
+};
 
 /// Cells along a side of the square.
 pub(super) const CELLS: usize = 32;
@@ -82,7 +85,7 @@ impl Patch {
             for sub in 0..n * n {
                 let at = corner + DVec2::new((sub % n) as f64, (sub / n) as f64);
                 let colour = bilinear(picture, first + right * at.x + below * at.y);
-                sum.iter_mut().zip(colour).for_each(|(sum, value)| *sum += value);
+                sum.iter_mut().zip(colour).for_each(|(sum, value)| *sum += value / 255.0);
             }
             sum.map(|sum| sum / (n * n) as f32)
         };
@@ -93,27 +96,6 @@ impl Patch {
 /// To the right when `down` is down.
 fn across(down: DVec2) -> DVec2 {
     DVec2::new(down.y, -down.x)
-}
-
-/// The colour at a place between pixels, 0..1.
-fn bilinear(picture: &RgbImage, at: DVec2) -> [f32; 3] {
-    let (last_x, last_y) =
-        (i64::from(picture.width().saturating_sub(1)), i64::from(picture.height().saturating_sub(1)));
-    let low = at.floor();
-    let (fx, fy) = ((at.x - low.x) as f32, (at.y - low.y) as f32);
-    let pixel = |x: i64, y: i64| {
-        let pixel = picture.get_pixel_checked(x.clamp(0, last_x) as u32, y.clamp(0, last_y) as u32);
-        pixel.map_or([0.0; 3], |pixel| pixel.0.map(f32::from))
-    };
-    let (x, y) = (low.x as i64, low.y as i64);
-    let (a, b, c, d) = (pixel(x, y), pixel(x + 1, y), pixel(x, y + 1), pixel(x + 1, y + 1));
-    let mut mixed = [0.0; 3];
-    for (k, mixed) in mixed.iter_mut().enumerate() {
-        let top = a[k] + (b[k] - a[k]) * fx;
-        let bottom = c[k] + (d[k] - c[k]) * fx;
-        *mixed = (top + (bottom - top) * fy) / 255.0;
-    }
-    mixed
 }
 
 #[cfg(test)]

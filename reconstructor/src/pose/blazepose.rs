@@ -7,7 +7,7 @@ use image::RgbImage;
 
 use super::{JOINTS, Joint};
 use crate::{
-    geometry::{Mask, PixelBox},
+    geometry::{Mask, PixelBox, bilinear},
     inference::{InferenceError, Model, Tensor},
 };
 
@@ -113,26 +113,6 @@ fn network_input(picture: &RgbImage, square: Square) -> Vec<f32> {
         }
     }
     input
-}
-
-/// The colour between four pixels, 0..255; the picture is not empty.
-fn bilinear(picture: &RgbImage, at: DVec2) -> [f32; 3] {
-    let limit = DVec2::new(f64::from(picture.width()) - 1.0, f64::from(picture.height()) - 1.0);
-    let at = at.clamp(DVec2::ZERO, limit.max(DVec2::ZERO));
-    let (x, y) = (at.x as u32, at.y as u32);
-    let (fx, fy) = ((at.x - f64::from(x)) as f32, (at.y - f64::from(y)) as f32);
-    let pixel = |x: u32, y: u32| {
-        let p = picture.get_pixel(x.min(picture.width() - 1), y.min(picture.height() - 1));
-        p.0.map(f32::from)
-    };
-    let (a, b, c, d) = (pixel(x, y), pixel(x + 1, y), pixel(x, y + 1), pixel(x + 1, y + 1));
-    let mut colour = [0.0; 3];
-    for (i, value) in colour.iter_mut().enumerate() {
-        let top = a[i] + (b[i] - a[i]) * fx;
-        let bottom = c[i] + (d[i] - c[i]) * fx;
-        *value = top + (bottom - top) * fy;
-    }
-    colour
 }
 
 fn joints(landmarks: &[f32], metres: &[f32], square: Square) -> Vec<Joint> {
